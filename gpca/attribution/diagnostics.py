@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gpca.evaluation.intervals import quantile_bounds
+from gpca.evaluation.intervals import mean_ranks, quantile_bounds
 
 BINS = 15  # calibration errors are measured over so many (Guo et al. 2017)
 LEAST_PROBABILITY = 1e-12  # that a true class counts with
@@ -66,11 +66,9 @@ def brier_score(p_S_C: np.ndarray, target_S: np.ndarray) -> float:
 
 def rank_correlation(uncertainty_S: np.ndarray, distance_S: np.ndarray) -> float:
     """Return Spearman's ρ; 0 where one of the two is constant, as it then orders nothing."""
-    from scipy.stats import rankdata
-
     if len(uncertainty_S) < 2 or np.ptp(uncertainty_S) == 0 or np.ptp(distance_S) == 0:
         return 0.0
-    return float(np.corrcoef(rankdata(uncertainty_S), rankdata(distance_S))[0, 1])
+    return float(np.corrcoef(mean_ranks(uncertainty_S), mean_ranks(distance_S))[0, 1])
 
 
 def bootstrap_interval(

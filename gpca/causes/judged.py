@@ -17,7 +17,7 @@ from gpca.attribution.predictions import read_predictions
 from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.causes.truth import ALL, BORDERLINE, FAILED, NOMINAL, Truth
 from gpca.errors import InputError
-from gpca.evaluation.intervals import ANYTHING, weighted_mean
+from gpca.evaluation.intervals import ANYTHING, mean_ranks, weighted_mean
 from gpca.evaluation.measures import SHARE, Measure, source_method_seed
 from gpca.io.container import require_same_samples
 from gpca.pairs.perturbation import CONCEPTS
@@ -196,8 +196,6 @@ SMALLER_IS_BETTER = tuple(name for name, each in MEASURES.items() if each.least_
 
 def measure(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
     """Return every measure (B,) of :data:`MEASURES` that the explainer has."""
-    from scipy.stats import rankdata
-
     labeled_N, shown_N, failed_N = _labeled(samples), _shown(samples), _failed(samples)
     weights_B_n, weights_B_F = weights_B_N[:, labeled_N], weights_B_N[:, failed_N]
     called_failed_N = samples.nominal < samples.scores.max(axis=1)
@@ -228,7 +226,7 @@ def measure(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
         for i in range(len(CONCEPTS))
     ]
     scores_F_3, phi_F_3 = samples.scores[failed_N], samples.phi[failed_N]
-    ranks = [rankdata(of, axis=1) if len(of) else of for of in (scores_F_3, phi_F_3)]
+    ranks = [np.array([mean_ranks(row) for row in of]).reshape(of.shape) for of in (scores_F_3, phi_F_3)]
     spearman_F = _cosines(*(ranks_F_3 - ranks_F_3.mean(axis=1, keepdims=True) for ranks_F_3 in ranks))
     return measures | {
         **decision_measures(samples, weights_B_N),

@@ -27,6 +27,17 @@ ANYTHING = (-np.inf, np.inf)  # limits of a value that has none
 UNTRAINED = ("chance", "most_frequent", "rule")  # explainers of baselines/untrained.py
 
 
+def mean_ranks(values_N: np.ndarray) -> np.ndarray:
+    """Return the ranks (N,) from 1 on, equal values sharing their mean; all are NaN beside a NaN.
+
+    They are those of scipy.stats, whose import takes a second.
+    """
+    if np.isnan(values_N).any():
+        return np.full(len(values_N), np.nan)
+    sorted_N = np.sort(values_N)
+    return (np.searchsorted(sorted_N, values_N, "left") + np.searchsorted(sorted_N, values_N, "right") + 1) / 2
+
+
 class Estimate(NamedTuple):
     """A value and the bounds of its 95 % interval, NaN where there is none."""
 
@@ -108,9 +119,9 @@ def wilson_interval(successes: float, trials: int, level: float = LEVEL) -> tupl
 @cache
 def student_factor(repeats: int, level: float = LEVEL) -> float:
     """Half of Student's interval of a mean, in standard errors; NaN for one repeat."""
-    from scipy.stats import t as student_t
+    from scipy.special import stdtrit
 
-    return float(student_t.ppf((1 + level) / 2, repeats - 1))
+    return float(stdtrit(repeats - 1, (1 + level) / 2))
 
 
 def mean_interval(values_R: Iterable[float], level: float = LEVEL) -> Estimate:

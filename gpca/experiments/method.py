@@ -12,6 +12,7 @@ from gpca.declarations.experiment import Experiment
 from gpca.declarations.plan import Run
 from gpca.declarations.result import Figure, figure
 from gpca.errors import InputError
+from gpca.evaluation.intervals import mean_ranks
 from gpca.experiments import registration_stages as stages_of
 from gpca.experiments.frames import encoder_title
 from gpca.experiments.recovery_example import short_action
@@ -150,12 +151,10 @@ def fig3_concepts(run: Run, objects_file: Path, registrations_file: Path) -> Fig
 
 def choose_samples(registrations: Registrations, path: str | Path) -> dict[str, int]:
     """Row of the test sample nearest to the middle rank of severity, for each concept, of one object."""
-    from scipy.stats import rankdata
-
     distance_S = np.full(len(registrations), np.inf)  # of ranks from the middle rank; infinite: is not shown
     for concept, names in SEVERITIES_OF.items():
         rows = np.flatnonzero((registrations.split == "test") & (registrations.concept == concept))
-        ranks = [rankdata(getattr(registrations, f"severity_{name}")[rows]) / (len(rows) + 1) for name in names]
+        ranks = [mean_ranks(getattr(registrations, f"severity_{name}")[rows]) / (len(rows) + 1) for name in names]
         distance_S[rows] = np.abs(np.array(ranks) - 0.5).max(axis=0)
     is_shown_S = np.isfinite(distance_S)
     object_names = list(dict.fromkeys(registrations.object_name.tolist()))

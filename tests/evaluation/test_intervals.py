@@ -5,7 +5,14 @@ import pytest
 
 from baselines import untrained
 from gpca.evaluation import intervals
-from gpca.evaluation.intervals import interval, mean_interval, quantile_bounds, wilson_interval
+from gpca.evaluation.intervals import (
+    interval,
+    mean_interval,
+    mean_ranks,
+    quantile_bounds,
+    student_factor,
+    wilson_interval,
+)
 from gpca.seeds import generator
 
 SEED = np.repeat([100, 101], 6)
@@ -120,3 +127,13 @@ def test_the_best_untrained_one_is_beaten_by_a_paired_difference():
     assert value == pytest.approx(RIGHT["good"].mean() - RIGHT["rule"].mean())
     alone = {"good": VALUES["good"], "rule": np.full(1 + intervals.REPEATS, np.nan)}
     assert intervals.best_of(alone, intervals.UNTRAINED) == ""
+
+
+def test_ranks_and_the_factors_of_student_are_those_of_scipy_stats():
+    from scipy import stats
+
+    draws = np.random.default_rng(0)
+    for values_N in (draws.normal(size=50), draws.integers(0, 5, 60), np.zeros(0), np.array([1.0, np.nan, np.inf])):
+        assert np.array_equal(mean_ranks(values_N), stats.rankdata(values_N), equal_nan=True)
+    for repeats in range(1, 30):
+        assert np.array_equal(student_factor(repeats), stats.t.ppf(0.975, repeats - 1), equal_nan=True)

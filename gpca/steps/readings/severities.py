@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import rankdata
 
 from gpca.attribution.predictions import read_predictions
+from gpca.evaluation.intervals import mean_ranks
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.objects.canonical import ObjectClouds
@@ -46,7 +46,7 @@ def third_S(registrations: Registrations) -> np.ndarray:
     That of a pose error is the mean of the ranks of its angle and its length.
     """
     names_S = np.empty(len(registrations), object)
-    pose_S = rankdata(registrations.severity_rotation_rad) + rankdata(registrations.severity_translation)
+    pose_S = mean_ranks(registrations.severity_rotation_rad) + mean_ranks(registrations.severity_translation)
     severities = {"noise": registrations.severity_noise, "pose": pose_S, "overlap": registrations.severity_crop}
     for concept, severity_S in severities.items():
         rows = np.flatnonzero(registrations.concept == concept)
