@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gpca.classifier.kmeans import kmeans_plusplus
 from gpca.errors import require_known
 from gpca.process.plugins import joined_outside, module_outside
 
@@ -105,34 +106,6 @@ def bald_kmeans(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarr
     distance_n = np.square(h_n_d - centers_B_d[cluster_n]).sum(axis=1)
     nearest = [min(np.flatnonzero(cluster_n == cluster), key=distance_n.__getitem__) for cluster in range(batch)]
     return candidates[sorted(nearest)]
-
-
-def kmeans_plusplus(h_n_d: np.ndarray, clusters: int, seed: int) -> list[int]:
-    """Rows of the first centers by k-means++ (Arthur and Vassilvitskii 2007), as scikit-learn chooses them.
-
-    Of some rows, drawn in proportion to the squared distance to the nearest center, the one that lowers the sum most.
-    """
-    random = np.random.RandomState(seed)
-    squares_n = np.einsum("nd,nd->n", h_n_d, h_n_d)
-
-    def squared_distances(rows: list[int] | np.ndarray) -> np.ndarray:
-        return np.maximum(
-            -2 * (h_n_d[rows] @ h_n_d.T) + np.einsum("nd,nd->n", h_n_d[rows], h_n_d[rows])[:, None] + squares_n, 0
-        )
-
-    n, weight_n = len(h_n_d), np.ones(len(h_n_d))
-    chosen = [int(random.choice(n, p=weight_n / weight_n.sum()))]
-    nearest_1_n = squared_distances(chosen)
-    total = nearest_1_n @ weight_n
-    while len(chosen) < clusters:
-        drawn = random.uniform(size=2 + int(np.log(clusters))) * total
-        tried_T = np.clip(np.searchsorted(np.cumsum(nearest_1_n), drawn), None, n - 1)
-        nearest_T_n = np.minimum(nearest_1_n, squared_distances(tried_T))
-        totals_T_1 = nearest_T_n @ weight_n[:, None]
-        best = np.argmin(totals_T_1)
-        total, nearest_1_n = totals_T_1[best], nearest_T_n[best]
-        chosen.append(int(tried_T[best]))
-    return chosen
 
 
 def balanced_kmeans(h_n_d: np.ndarray, clusters: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:

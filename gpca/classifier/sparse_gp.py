@@ -16,6 +16,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import softplus
 
+from gpca.classifier.kmeans import kmeans
 from gpca.classifier.latents import Latents
 from gpca.classifier.prior import JITTER, Covariance, Prior
 from gpca.classifier.settings import GPCSettings
@@ -158,15 +159,12 @@ class Start:
     @classmethod
     def of(cls, inputs_N_d: Tensor, n_classes: int, settings: GPCSettings, axes: tuple) -> Start:
         """Return the start around standardized inputs; `axes` name the seeds."""
-        from sklearn.cluster import KMeans
-
         order = generator(*axes, "median").permutation(len(inputs_N_d))[:MOST_MEDIAN]
         median = float(torch.pdist(inputs_N_d[order]).median()) if len(order) > 1 else 0.0
         covariance = Covariance.start(settings.kernel, n_classes, median if median > 0 else 1.0)
         clusters = min(settings.inducing, len(torch.unique(inputs_N_d, dim=0)))
-        kmeans = KMeans(clusters, n_init=1, random_state=seed_of(*axes, "inducing") % 2**32).fit(inputs_N_d.numpy())
-        centers_M_d = torch.from_numpy(kmeans.cluster_centers_.astype(np.float32))
-        return cls(covariance, centers_M_d, seed_of(*axes, "gpc"))
+        centers_M_d = kmeans(inputs_N_d.numpy(), clusters, seed_of(*axes, "inducing") % 2**32)
+        return cls(covariance, torch.from_numpy(centers_M_d.astype(np.float32)), seed_of(*axes, "gpc"))
 
     @classmethod
     def after(cls, prior: Prior, axes: tuple) -> Start:

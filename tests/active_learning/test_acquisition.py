@@ -2,7 +2,6 @@ from collections import Counter
 
 import numpy as np
 import pytest
-import sklearn.cluster
 
 from gpca.active_learning.acquisition import (
     EXPANSION,
@@ -10,7 +9,6 @@ from gpca.active_learning.acquisition import (
     Pool,
     balanced_kmeans,
     bald_kmeans,
-    kmeans_plusplus,
     select,
     top,
 )
@@ -130,17 +128,6 @@ def test_a_crowd_of_uncertain_samples_gets_as_many_labels_as_it_has_shares_of_th
     pool = make_pool(30, h_N_d=h, bald_N=uncertain.astype(float))
     rows = np.array(selected("bald_kmeans", pool, 4))
     assert ((rows < 12).sum(), uncertain[rows].sum()) == (3, 4)
-
-
-@pytest.mark.parametrize("n", [2, 9, 40])
-@pytest.mark.parametrize("repeated", [False, True])
-def test_the_first_centers_are_those_of_scikit_learn(n, repeated):
-    for seed in range(20):
-        random = np.random.default_rng(seed)
-        h_n_d = random.normal(size=(n, 17))[random.integers(n, size=n) if repeated else slice(None)]
-        clusters = int(random.integers(1, min(n, 8) + 1))
-        _, expected = sklearn.cluster.kmeans_plusplus(h_n_d, clusters, random_state=seed)
-        assert kmeans_plusplus(h_n_d, clusters, seed) == expected.tolist()
 
 
 def test_bald_kmeans_names_the_most_uncertain_of_its_choice_first():
