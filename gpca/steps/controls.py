@@ -17,7 +17,6 @@ from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import prediction_frame
 from gpca.classifier.scores import Attribution
 from gpca.encoders.registry import EncoderSettings
-from gpca.encoders.training import embedding_by, load_model
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.interface import BARE, Describing, Encoding, ExplainerEntry
 from gpca.explainers.registry import Embed, described_for, make_rivals
@@ -40,6 +39,8 @@ Attach = Callable[[Registrations], Registrations]
 
 
 def explain(job: Job) -> None:
+    from gpca.encoders.training import embedding_by, load_model
+
     rivals = make_rivals(job.section("explainers"), job.source, job.seed)
     settings = read_settings(samples.ControlSettings, job.section("controls"))
     encoder = EncoderSettings(**job.section("encoder"))
