@@ -16,7 +16,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from gpca.process.compilation import LIBRARY, MODULES, Loop, library, state
+from gpca.process.compilation import LIBRARY, MODULES, Loop, library, numba, state
 from gpca.process.processor import COMMON_LEVEL, pin_instructions
 
 # Where a loop makes an array, numba's machine code reads the count of references and the data of this.
@@ -39,8 +39,6 @@ def build(loops: list[Loop], path: Path, compiler: str) -> None:
     """Write the library of loops."""
     import llvmlite.binding as llvm
 
-    from gpca.process.numba_cache import njit
-
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
     target = llvm.Target.from_triple(llvm.get_process_triple())
@@ -48,7 +46,7 @@ def build(loops: list[Loop], path: Path, compiler: str) -> None:
     code = llvm.parse_assembly("")
     code.triple = machine.triple
     for loop in loops:
-        dispatcher = njit(**loop.options | {"cache": False, "parallel": False})(loop.py_func)
+        dispatcher = numba().njit(**loop.options | {"cache": False, "parallel": False})(loop.py_func)
         types = _types(iter(loop.ahead.split()))
         dispatcher.compile(types)
         compiled = dispatcher.overloads[types]

@@ -9,9 +9,11 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import os
+import sys
 from collections.abc import Callable
 from functools import cache, cached_property, update_wrapper
 from pathlib import Path
+from types import ModuleType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -81,11 +83,9 @@ class Loop:
     @cached_property
     def dispatcher(self) -> Any:
         """What numba makes of the function."""
-        from gpca.process import numba_cache
-
         if self.options.get("parallel"):
-            self.py_func.__globals__["prange"] = numba_cache.prange
-        return numba_cache.njit(**self.options)(self.py_func)
+            self.py_func.__globals__["prange"] = numba().prange
+        return numba().njit(**self.options)(self.py_func)
 
 
 def njit(ahead: str = "", **options: Any) -> Callable[[Callable[..., Any]], Loop]:
@@ -129,6 +129,22 @@ def state() -> str:
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
 
 
+@cache
+def numba() -> ModuleType:
+    """Return numba with our cache, to which loops in other loops are what it makes of them."""
+    from gpca.process import numba_cache
+
+    numba_cache.typeof_impl.register(Loop)(lambda loop, _: numba_cache.types.Dispatcher(loop.dispatcher))
+    numba_cache.register("numba:compile", numba_cache.Compilations(_announce))
+    return numba_cache
+
+
 def say_when_compiling() -> None:
     """Print one line to stderr when the next loop is compiled rather than loaded."""
     Loop.announced = True
+
+
+def _announce() -> None:
+    if Loop.announced:
+        print(NOTICE + (REMEDY if may_pin() and not library() else ""), file=sys.stderr, flush=True)
+    Loop.announced = False

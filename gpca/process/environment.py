@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 MODULES = {  # extra of pyproject.toml -> modules of its packages, which `gpca explain` does without
     "suite": (
         "gpytorch",
+        "llvmlite",
         "manifold3d",
         "numba",
         "open3d",

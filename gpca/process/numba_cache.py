@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import hashlib
 import os
-import sys
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +19,8 @@ from numba.core.event import Listener, register
 from numba.extending import typeof_impl
 
 from gpca.process.code_files import ROOT, code_files
-from gpca.process.compilation import NOTICE, REMEDY, Loop, library
-from gpca.process.processor import may_pin
 
-__all__ = ["njit", "prange"]
+__all__ = ["Compilations", "njit", "prange", "register", "typeof_impl", "types"]
 
 VARIABLE = "NUMBA_CACHE_DIR"
 
@@ -65,22 +63,20 @@ class PackageLocator(UserProvidedCacheLocator):
         return ".".join(Path(py_file).relative_to(ROOT).parent.parts)
 
 
-class _Notice(Listener):
+class Compilations(Listener):
+    """Calls a function before each."""
+
+    def __init__(self, before: Callable[[], None]) -> None:
+        self._before = before
+
     def on_start(self, event: object) -> None:
-        if Loop.announced:
-            print(NOTICE + (REMEDY if may_pin() and not library() else ""), file=sys.stderr, flush=True)
-        Loop.announced = False
+        """Call the function."""
+        self._before()
 
     def on_end(self, event: object) -> None:
         """Do nothing."""
 
 
-@typeof_impl.register(Loop)
-def _type_of_loop(loop: Loop, context: object) -> types.Dispatcher:
-    return types.Dispatcher(loop.dispatcher)  # where another loop calls it
-
-
 os.environ[VARIABLE] = str(_cache_folder())  # read by numba whenever such a variable has changed, and by children
 setattr(config, "CACHE_DIR", os.environ[VARIABLE])  # noqa: B010 - numba may have been imported before
 setattr(config, "CACHE_LOCATOR_CLASSES", f"{__name__}.{PackageLocator.__name__},{UserProvidedCacheLocator.__name__}")  # noqa: B010
-register("numba:compile", _Notice())
