@@ -92,7 +92,8 @@ class Explainer:
                 ICP, on whose results the classifier was trained.
             estimator: uncertainty estimator (docs/estimators.md) that needs no training registrations. A note states
                 why it failed.
-            fast: whether to re-enact fewer points and poses, in half the time: less accurate, without a guarantee.
+            fast: whether to re-enact fewer points and poses, without a guarantee; it saves a tenth to a fifth of the
+                time.
 
         Raises:
             InputError: too few points, NaN, implausible unit, very different sizes, an initial pose that is not rigid,

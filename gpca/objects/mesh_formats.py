@@ -67,9 +67,11 @@ class _Element(NamedTuple):
     @property
     def corners(self) -> bytes | None:
         """The list of the corners of faces: by its name, or the only property."""
+        if self.name != "face":
+            return None
         lists = [each.name for each in self.properties if each.length_kind]
-        known = [name for name in lists if name in CORNERS] or lists[: len(self.properties) == 1]
-        return known[0] if self.name == "face" and known else None
+        only = lists[0] if lists and len(self.properties) == 1 else None
+        return next((name for name in lists if name in CORNERS), only)
 
 
 def _read_ply(file: IO[bytes]) -> Shape:
