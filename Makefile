@@ -15,7 +15,8 @@ PYTEST_ARGS ?=
 # Wheels only, or a missing one would turn into a long failing compilation; connection_pool has none and is pure Python.
 INSTALL := -m pip install --quiet --disable-pip-version-check --only-binary=:all: --no-binary=connection_pool
 RUN := PATH="$(CURDIR)/.venv/bin:$$PATH"
-PROCESSES := tests/process/test_processor.py tests/test_emulation.py tests/test_benchmarks.py tests/encoders/test_reduction.py
+# The first compiles UMAP's loops beside them, where the smoke run finds them.
+PROCESSES := tests/encoders/test_reduction.py tests/process/test_processor.py tests/test_emulation.py tests/test_benchmarks.py
 PARTS := test-workflow test-library test-processes
 # What is imported is kept compiled, whatever the user's environment says: thousands of processes import it.
 PYTEST := $(RUN) OMP_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= python -m pytest
