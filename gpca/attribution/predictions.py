@@ -13,7 +13,7 @@ import numpy as np
 
 from gpca.errors import InputError
 from gpca.io.container import require_same_samples
-from gpca.io.csv_file import numbers, read_csv, read_numbers, write_csv
+from gpca.io.csv_file import numbers, read_columns, read_csv, write_columns
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,28 +30,30 @@ _OF_CONCEPTS = ("score_?*", "variance_?*", "bald", "entropy")  # further columns
 
 def write_predictions(path: str | Path, registrations: Registrations, attribution: Attribution) -> None:
     """Write the prediction file that every table is made from (results/README.md)."""
-    write_csv(path, prediction_frame(registrations, attribution))
+    write_columns(path, _columns(registrations, attribution))
 
 
 def prediction_frame(registrations: Registrations, attribution: Attribution) -> pd.DataFrame:
     import pandas as pd
 
-    return pd.DataFrame(
-        {
-            "sample": registrations.sample,
-            "split": registrations.split,
-            "object": registrations.object_name,
-            "cluster": registrations.cluster,
-            "concept_true": registrations.concept,
-            "concept_predicted": attribution.predicted_N,
-            **{f"score_{c}": attribution.scores_N_C[:, i] for i, c in enumerate(attribution.concepts)},
-            **{f"variance_{c}": attribution.variances_N_C[:, i] for i, c in enumerate(attribution.concepts)},
-            "bald": attribution.bald_N,
-            "entropy": attribution.entropy_N,
-            "abstained": attribution.abstained_N,
-            "icp_calls": attribution.icp_calls_N,
-        }
-    )
+    return pd.DataFrame(_columns(registrations, attribution))
+
+
+def _columns(registrations: Registrations, attribution: Attribution) -> dict[str, np.ndarray]:
+    return {
+        "sample": registrations.sample,
+        "split": registrations.split,
+        "object": registrations.object_name,
+        "cluster": registrations.cluster,
+        "concept_true": registrations.concept,
+        "concept_predicted": attribution.predicted_N,
+        **{f"score_{c}": attribution.scores_N_C[:, i] for i, c in enumerate(attribution.concepts)},
+        **{f"variance_{c}": attribution.variances_N_C[:, i] for i, c in enumerate(attribution.concepts)},
+        "bald": attribution.bald_N,
+        "entropy": attribution.entropy_N,
+        "abstained": attribution.abstained_N,
+        "icp_calls": attribution.icp_calls_N,
+    }
 
 
 def read_predictions(path: str | Path, labels: Sequence[str] = ()) -> pd.DataFrame:
@@ -81,17 +83,15 @@ def write_timings(
     path: str | Path, registrations: Registrations, seconds_S: np.ndarray, icp_seconds_S: np.ndarray
 ) -> None:
     """Write seconds per sample, in a file of their own, as they differ from run to run."""
-    import pandas as pd
-
     columns = {"sample": registrations.sample, "split": registrations.split}
-    write_csv(path, pd.DataFrame(columns | {"seconds": seconds_S, "icp_seconds": icp_seconds_S}))
+    write_columns(path, columns | {"seconds": seconds_S, "icp_seconds": icp_seconds_S})
 
 
 def read_timings(path: str | Path, registrations: Registrations) -> tuple[np.ndarray, np.ndarray]:
     """Return seconds (S,) and icp_seconds (S,) of the registrations."""
-    rows = read_numbers(path, TIMING_COLUMNS, ("seconds", "icp_seconds"))
+    rows = read_columns(path, TIMING_COLUMNS, ("seconds", "icp_seconds"))
     require_same_samples(path, rows, registrations.arrays)
-    return rows["seconds"].to_numpy(), rows["icp_seconds"].to_numpy()
+    return np.asarray(rows["seconds"]), np.asarray(rows["icp_seconds"])
 
 
 def require_samples(path: str | Path, rows: pd.DataFrame, keys: Iterable[str] = ("split", "sample")) -> None:

@@ -16,7 +16,7 @@ from gpca.causes.measuring import Measuring, Subject, as_causes, measure_clean_p
 from gpca.causes.settings import CauseSettings, Shares
 from gpca.causes.truth import ALL, BORDERLINE, FAILED, GEOMETRY, NOMINAL, NONE, Truth
 from gpca.errors import InputError
-from gpca.io.csv_file import write_csv
+from gpca.io.csv_file import write_columns
 from gpca.io.files import SPLITS
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.perturbation import CONCEPTS
@@ -119,11 +119,9 @@ class Tally(Counter[tuple[str, str, str, bool, bool]]):
 
     def save(self, path: str | Path) -> None:
         """Write the CSV described in results/README.md."""
-        import pandas as pd
-
         keys = sorted({key[:-1] for key in self})
         rows = [(*key[:3], int(key[3]), self[*key, True], self[*key, False]) for key in keys]
-        write_csv(path, pd.DataFrame(rows, columns=list(COLUMNS)))
+        write_columns(path, dict(zip(COLUMNS, map(np.array, zip(*rows, strict=True)), strict=True)))
 
 
 ENDS = (NONE,) * ALL + (ALL,)  # they tell the state, and so whether the others are worth their time

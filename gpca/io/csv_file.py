@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import csv
+from collections.abc import Iterable, Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +16,8 @@ from gpca.numerals import decimal
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from gpca.io.container import Columns
 
 _CONTROL = r"[\x00-\x08\x0a-\x1f\x7f]"  # all but tabs
 NAMES = ("object", "cluster", "method", "explainer", "policy")  # columns of names, which must not be empty
@@ -93,6 +96,22 @@ def read_numbers(
     return rows
 
 
+def read_columns(path: str | Path, columns: Sequence[str], numeric: Sequence[str]) -> Columns:
+    """Read a CSV file as :func:`read_numbers` does, without pandas if it is plain, as most that a step reads are."""
+    require_file(path, "no such file", "make it with snakemake")
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+        head, *lines, end = text.split("\n")
+        entries = [line.split(",") for line in lines]
+        is_plain = head == ",".join(columns) and not end and '"' not in text and all(map(str.isprintable, lines))
+        texts = dict(zip(columns, zip(*entries, strict=True), strict=True))  # none where there are no rows
+        if is_plain and {*texts.get("split", ())} <= {*SPLITS}:
+            return {name: np.array([*map(decimal, of)] if name in numeric else of) for name, of in texts.items()}
+    except ValueError:  # of unpacking, decoding, or a number
+        pass
+    return read_numbers(path, columns, numeric)
+
+
 def finite_number(subject: object, name: str, text: str, remedy: str = "regenerate it") -> float:
     """Return the number in a field; `subject` and `name` locate it in messages."""
     try:
@@ -105,3 +124,16 @@ def write_csv(path: str | Path, frame: pd.DataFrame, form: str | None = "%.6f") 
     """Write a CSV file, whole or not at all, with floats in `form`; None keeps all digits."""
     with whole_file(path) as partial:
         frame.to_csv(partial, index=False, float_format=form, lineterminator="\n")
+
+
+def write_columns(path: str | Path, columns: Mapping[str, np.ndarray], form: str = "%.6f") -> None:
+    """Write the bytes that :func:`write_csv` does of columns of one type each, without pandas."""
+    arrays = map(np.asarray, columns.values())
+    entries = [
+        ["" if value != value else form % value for value in of.tolist()] if of.dtype.kind == "f" else of.tolist()
+        for of in arrays
+    ]
+    with whole_file(path) as partial, partial.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(zip(*entries, strict=True))

@@ -11,7 +11,7 @@ import numpy as np
 from gpca.errors import InputError
 from gpca.io.arrays import TEXT, WHOLE
 from gpca.io.container import FLAG, Container, array, require_same_samples
-from gpca.io.csv_file import read_numbers, write_csv
+from gpca.io.csv_file import read_columns, write_columns
 from gpca.pairs.dataset import Registrations
 
 
@@ -30,11 +30,9 @@ class Outcomes(Container):
 
     def write_table(self, path: str | Path, conditions: Sequence[str]) -> None:
         """Write the uncertainties as CSV, in nats, a column for each of the K conditions, for readers and metrics."""
-        import pandas as pd
-
         columns = {"sample": self.sample, "split": self.split}
         columns |= {f"uncertainty_{condition}": self.uncertainty[:, k] for k, condition in enumerate(conditions)}
-        write_csv(path, pd.DataFrame(columns))
+        write_columns(path, columns)
 
     def attach_to(
         self, registrations: Registrations, seconds_S_K: np.ndarray, icp_seconds_S_K: np.ndarray
@@ -52,20 +50,18 @@ class Outcomes(Container):
 
 def write_seconds(path: str | Path, outcomes: Outcomes, seconds_S_K: np.ndarray, icp_seconds_S_K: np.ndarray) -> None:
     """Write the seconds of every sample and condition, apart from the outcomes: they differ from run to run."""
-    import pandas as pd
-
     conditions = seconds_S_K.shape[1]
     columns = {name: np.repeat(getattr(outcomes, name), conditions) for name in ("sample", "split")}
     columns |= {"condition": np.tile(np.arange(conditions), len(seconds_S_K))}
     columns |= {"seconds": seconds_S_K.ravel(), "icp_seconds": icp_seconds_S_K.ravel()}
-    write_csv(path, pd.DataFrame(columns))
+    write_columns(path, columns)
 
 
 def read_seconds(path: str | Path, outcomes: Outcomes) -> tuple[np.ndarray, np.ndarray]:
     """Return seconds (S, K) and seconds inside ICP (S, K) of the outcomes' samples."""
     columns = ("sample", "split", "condition", "seconds", "icp_seconds")
-    rows = read_numbers(path, columns, ("seconds", "icp_seconds"))
+    rows = read_columns(path, columns, ("seconds", "icp_seconds"))
     shape = outcomes.uncertainty.shape
     repeated = {name: np.repeat(getattr(outcomes, name), shape[1]) for name in ("sample", "split")}
     require_same_samples(path, rows, repeated, "outcomes")
-    return rows["seconds"].to_numpy().reshape(shape), rows["icp_seconds"].to_numpy().reshape(shape)
+    return np.asarray(rows["seconds"]).reshape(shape), np.asarray(rows["icp_seconds"]).reshape(shape)

@@ -7,7 +7,7 @@ import pytest
 from gpca.attribution.predictions import read_predictions, read_timings, write_predictions, write_timings
 from gpca.classifier.scores import Attribution
 from gpca.errors import InputError
-from gpca.io.csv_file import ANY, read_csv
+from gpca.io.csv_file import ANY, read_columns, read_csv, read_numbers, write_columns, write_csv
 from gpca.pairs.perturbation import CONCEPTS
 
 
@@ -132,3 +132,55 @@ def test_a_file_may_have_further_columns_where_its_reader_knows_them(tmp_path):
     (tmp_path / "a.csv").write_text("sample,score_pose,own\n1,2,3\n")
     assert list(read_csv(tmp_path / "a.csv", ["sample"], ["score_*", "own"])) == ["sample", "score_pose", "own"]
     assert len(read_csv(tmp_path / "a.csv", ["sample"], ANY)) == 1
+
+
+def test_columns_are_written_and_read_as_by_pandas(tmp_path):
+    random = np.random.default_rng(0)
+    columns = {
+        "sample": np.arange(300),
+        "split": np.array(["train", "test"] * 150),
+        "object": np.array(["a cup", 'a "cup"', "a, cup", "", " é", "1.0"] * 50),
+        "seconds": random.normal(size=300) * 10.0 ** random.integers(-9, 9, size=300),
+        "score_pose": np.where(np.arange(300) % 7, random.random(300), np.nan).astype(np.float32),
+        "abstained": np.arange(300) % 2 == 0,
+    }
+    for form in ("%.6f", "%.6g"):
+        write_csv(tmp_path / "pandas.csv", pd.DataFrame(columns), form)
+        write_columns(tmp_path / "own.csv", columns, form)
+        assert (tmp_path / "own.csv").read_bytes() == (tmp_path / "pandas.csv").read_bytes()
+    names = ("sample", "split", "seconds")
+    write_columns(tmp_path / "own.csv", {name: columns[name] for name in names})
+    own, expected = (read(tmp_path / "own.csv", names, ("seconds",)) for read in (read_columns, read_numbers))
+    assert isinstance(own, dict)
+    for name in names:
+        assert list(own[name]) == list(expected[name])
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        (None, "no such file"),
+        ("", "is empty"),
+        ("split,seconds\n", "no rows"),
+        ("split\ntest\n", "column 'seconds' is missing"),
+        ("split,seconds,minutes\ntest,2,3\n", "column 'minutes' is unknown"),
+        ("split,seconds\ntset,2\n", "a split that is neither"),
+        ("split,seconds\ntest,2_0\n", "not finite numbers"),
+        ("split,seconds\ntest,inf\n", "not finite numbers"),
+        ("split,seconds\ntest\n", "not finite numbers"),
+        ('split,seconds\n"te\x07st",2\n', "a line break or another control character"),
+    ],
+)
+def test_faulty_columns_are_refused_as_by_pandas(tmp_path, content, expected):
+    path = tmp_path / "seconds.csv"
+    if content is not None:
+        path.write_text(content)
+    with pytest.raises(InputError, match=expected):
+        read_columns(path, ("split", "seconds"), ("seconds",))
+
+
+def test_columns_in_another_order_or_in_quotes_are_read_too(tmp_path):
+    path = tmp_path / "seconds.csv"
+    path.write_text('seconds,split\n0.5,"test"\n')
+    rows = read_columns(path, ("split", "seconds"), ("seconds",))
+    assert (list(rows["split"]), list(rows["seconds"])) == (["test"], [0.5])
