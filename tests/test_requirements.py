@@ -64,6 +64,12 @@ def test_the_lock_pins_every_package_and_no_build():
         assert requirement.specifier.contains(pinned()[canonicalize_name(requirement.name)]), requirement
 
 
+def test_wheels_have_the_loops_of_the_locked_numba():
+    build = map(Requirement, tomllib.loads((ROOT / "pyproject.toml").read_text())["build-system"]["requires"])
+    versions = {line.name: str(line.specifier) for line in build if line.name != "setuptools"}
+    assert versions == {name: f"=={pinned()[name]}" for name in ("numba", "numpy")}
+
+
 def test_every_file_of_the_lock_but_torch_is_checked_by_its_hash():
     text = (ROOT / "environment.hashes").read_text().replace(" \\\n", "")
     entries = [line.split() for line in text.splitlines() if line[0] != "#"]
