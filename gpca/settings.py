@@ -155,6 +155,8 @@ def _fitted(kind: Any, value: Any) -> Any:
     origin, parts = get_origin(kind), get_args(kind)
     if origin is Annotated and all(isinstance(mark, Bounds) and mark.hold(value) for mark in parts[1:]):
         return _fitted(parts[0], value)
+    if origin is Annotated and isinstance(keys := parts[1], Keys) and {*keys.required} <= {*value} <= {*keys.kinds}:
+        return {name: _fitted(inner, value[name]) for name, inner in keys.kinds.items() if name in value}
     if origin is Literal and any(type(value) is type(part) and value == part for part in parts):
         return value
     if origin in (Union, UnionType):

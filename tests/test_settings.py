@@ -60,6 +60,7 @@ class Plain:
     inner: Inner | None = None
     options: dict | None = None
     name: Literal["a", "b"] | bool | None = None
+    by_name: Annotated[dict, Keys({"left": Inner, "right": Share}, required=("left",))] | None = None
 
 
 @pytest.mark.parametrize(
@@ -67,6 +68,7 @@ class Plain:
     [
         {"sizes": [0, 0.5, 1], "pairs": [[1, "a"]], "count": 3, "inner": {"size": 4, "ends": (1, 2.5)}},
         {"options": {"k": 3, "rate": 0.1, "on": True, "what": None, "name": "x"}, "name": "b", "count": None},
+        {"by_name": {"right": 0.5, "left": {"size": 3}}},
         {"options": {"deep": {"k": (1, 2)}}, "name": True, "sizes": ()},
     ],
 )
