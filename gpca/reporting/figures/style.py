@@ -32,6 +32,7 @@ SOURCE_COLOR = BLUE
 CONCEPT_COLORS = {"noise": ORANGE, "pose": PURPLE, "overlap": GREEN}
 CONCEPT_MARKERS = {"noise": "o", "pose": "s", "overlap": "^"}
 SMALL_PT = 7  # No letters are smaller.
+UNDATED = dict.fromkeys(("CreationDate", "ModDate", "Producer", "Creator"))  # metadata of a PDF
 
 # Where many methods share a panel, the paper's have a color, a line and a width, and all others are gray.
 METHOD_LOOKS: dict[str, tuple[str, Any, float]] = {
@@ -74,9 +75,8 @@ def blues():
 
 def save_figure(figure, pdf_path: str | Path, png_path: str | Path) -> None:
     """Write `figure` as vector PDF and as 300 dpi PNG, both without date or version, then close it."""
-    undated_pdf = {"CreationDate": None, "ModDate": None, "Producer": None, "Creator": None}
     with whole_file(pdf_path) as partial:
-        figure.savefig(partial, format="pdf", metadata=undated_pdf)
+        figure.savefig(partial, format="pdf", metadata=UNDATED)
     save_png(figure, png_path)
 
 

@@ -55,7 +55,9 @@ def test_a_drawing_has_few_colors_and_keeps_them(figure, tmp_path, photograph, m
     if photograph:
         figure.axes[0].imshow(np.random.default_rng(0).random((64, 64, 3)), interpolation="none", extent=(0, 8, 0, 1))
     figure.axes[0].bar(np.arange(8), 1, color=style.PALETTE)
-    style.save_png(figure, tmp_path / "a.png")
+    for name in ("a.png", "again.png"):
+        style.save_png(figure, tmp_path / name)
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "again.png").read_bytes()
     image = Image.open(tmp_path / "a.png")
     assert image.mode == mode
     assert round(image.info["dpi"][0]) == 300
