@@ -231,7 +231,7 @@ def _read_obj(file: IO[bytes]) -> Shape:
                 raise ValueError(f"line {number}: a vertex has {len(words)} numbers or a weight other than 1")
             rows.append(b" ".join(words[:3]))
         elif keyword == b"f":
-            corners = [[int(field or b"0") for field in [*word.split(b"/"), b"", b""][:3]] for word in words]
+            corners = [(*map(int, word.rstrip(b"/").replace(b"//", b"/0/").split(b"/")), 0, 0)[:3] for word in words]
             vertices = [vertex for vertex, *_ in corners]
             if len(corners) < 3 or 0 in vertices:
                 raise ValueError(f"line {number}: a face has {len(corners)} corners or refers to vertex 0")
@@ -324,8 +324,8 @@ def _triangles(polygons: np.ndarray | list, by_length: bool = True) -> np.ndarra
 
     Not `by_length`, they are in the order of the polygons.
     """
-    if isinstance(polygons, np.ndarray) and polygons.shape[1] == 3:
-        return polygons.astype(np.int64)
+    if set(map(len, polygons)) == {3}:
+        return np.array(polygons, np.int64)
     parts = [
         (min(len(polygon), 5), half if len(polygon) == 4 else 0, [polygon[i] for i in corners])
         for polygon in polygons
