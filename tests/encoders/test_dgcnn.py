@@ -190,3 +190,19 @@ def test_both_clouds_count_and_which_is_which(pair_encoder, pairs):
 def test_every_weight_of_an_encoder_learns(pair_encoder, pairs):
     pair_encoder.train()(pairs).square().sum().backward()
     assert all(weight.grad is not None and weight.grad.abs().sum() > 0 for weight in pair_encoder.parameters())
+
+
+@pytest.mark.parametrize("channels", [3, 8, 12, 16, 40, 64, 256])
+def test_sums_and_norms_of_arrays_have_the_bits_of_torchs_layers(channels):
+    random = np.random.default_rng(channels)
+    for batch, n in ((1, 37), (2, 300), (3, 512), (1, 700)):
+        x = random.normal(size=(batch, n, channels)).astype(np.float32)
+        np.testing.assert_array_equal(inference._mean(x), torch.from_numpy(x).mean(dim=1).numpy())
+        np.testing.assert_array_equal(inference._squares(x), torch.from_numpy(x * x).sum(dim=-1).numpy())
+    norm = torch.nn.BatchNorm1d(channels).eval()
+    for part in (norm.weight, norm.bias, norm.running_mean, norm.running_var):
+        part.data = torch.from_numpy(random.uniform(0.1, 3, channels).astype(np.float32))
+    weights = {f"norm.{name}": part.detach().numpy() for name, part in norm.state_dict().items()}
+    np.testing.assert_array_equal(
+        inference._normalized(x[0], weights, "norm"), norm(torch.from_numpy(x[0])).detach().numpy()
+    )

@@ -11,6 +11,8 @@ from gpca.process.code_files import ROOT
 
 # Each takes from a tenth of a second to more than one.
 WITHOUT = {
+    "gpytorch",
+    "linear_operator",
     "matplotlib",
     "networkx",
     "open3d",
@@ -19,6 +21,7 @@ WITHOUT = {
     "scipy.optimize",
     "scipy.stats",
     "sklearn",
+    "torch",
     "trimesh",
 }
 PRINTED = f"print(*sorted({WITHOUT} & set(sys.modules)), file=sys.stderr)"
