@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import torch
 
-from gpca.encoders import dgcnn, edge_kernels
+from gpca.encoders import dgcnn, edge_kernels, inference
 from gpca.encoders.dgcnn import CHANNELS, DGCNN, MOTION, EdgeConv, PairDGCNN, knn_indices
 from tests.encoders.per_edge import PerEdgeConv
 
