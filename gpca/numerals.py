@@ -1,4 +1,4 @@
-"""Numbers in users' text: finite plain decimals in ASCII.
+"""Numbers in text: those of users are finite plain decimals in ASCII, and lengths are shown without exponents.
 
 Python's int() and float() also accept digits of other scripts, underscores, NaN and infinity, and integers so long that
 they take minutes; all of these are typos or damage in a file.
@@ -19,6 +19,13 @@ def whole(text: str, least: int = 0, most: int = 10**9) -> int:
     if not _WHOLE.fullmatch(text) or not least <= int(text) <= most:
         raise ValueError(f"'{text[:40]}' is not a whole number from {least} to {most}")
     return int(text)
+
+
+def in_decimals(value: float, digits: int = 2) -> str:
+    """Return a number with that many significant digits, without an exponent: 0.000013, 1200."""
+    decimals = digits - 1 - math.floor(math.log10(abs(value))) if value and math.isfinite(value) else 0
+    text = f"{round(value, decimals):.{max(decimals, 0)}f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def decimal(text: str) -> float:

@@ -4,7 +4,7 @@ import pytest
 
 from gpca.errors import InputError
 from gpca.io.csv_file import finite_number
-from gpca.numerals import decimal, whole
+from gpca.numerals import decimal, in_decimals, whole
 from gpca.seeds import seed_of_file
 
 SLIPS = [
@@ -57,3 +57,11 @@ def test_the_name_of_a_file_tells_its_seed():
     for name in ("seed٣.npz", "seed1_0.npz", "12.npz", "seed.npz", "seed-1.npz"):
         with pytest.raises(InputError, match=r"is not named …/seed\{number\}\.npz; rename it"):
             seed_of_file(f"causes/mugs/{name}")
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(1.3e-5, "0.000013"), (0.1, "0.1"), (2.0, "2"), (1234.5, "1200"), (0.0, "0"), (-0.0456, "-0.046")],
+)
+def test_lengths_have_no_exponent(value, text):
+    assert in_decimals(value) == text

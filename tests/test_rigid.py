@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 from gpca.errors import InputError
 from gpca.rigid import (
     adjoint,
+    as_rows,
     best_motion,
     best_rotation,
     exp,
@@ -187,3 +188,16 @@ def test_points_move_by_their_jacobians():
     for axis in np.eye(6):
         moved = points @ exp(1e-6 * axis[None])[0][:3, :3].T + exp(1e-6 * axis[None])[0][:3, 3]
         assert np.allclose((moved - points) / 1e-6, point_jacobians(points) @ axis, atol=1e-5)
+
+
+def test_a_pose_that_is_written_moves_far_points_as_it_does_itself():
+    """At UTM coordinates, six significant digits moved a scan by more than a meter."""
+    random = np.random.default_rng(0)
+    for center, diameter in ((np.zeros(3), 0.2), (np.array([539719.56, 4065739.2, 1.8]), 40.0), (np.full(3, 4e6), 0.2)):
+        T = exp(np.array([[0.02, -0.01, 0.4, 0.1, 0.2, 0.3]]))[0]
+        T[:3, 3] += center - T[:3, :3] @ center
+        reach = 2 * np.linalg.norm(center) / diameter + 1
+        read = np.array([[float(word) for word in row.split()] for row in as_rows(T, reach)])
+        points = center + diameter * random.uniform(-0.5, 0.5, (100, 3))
+        assert np.abs(transform(read, points) - transform(T, points)).max() < 1e-6 * diameter
+    assert as_rows(np.eye(4), 1.0)[0].split() == ["1.000000000", "0.000000000", "0.000000000", "0.000000000"]

@@ -12,6 +12,7 @@ from gpca.causes.policy import NOTHING, QUEUE
 from gpca.causes.truth import ALL, FAILED, NOMINAL, shapley_values
 from gpca.evaluation.conformal import ALARM, GOOD
 from gpca.guarantee.guarantee import SEVERAL, Guarantee
+from gpca.numerals import in_decimals
 from gpca.objects.bop import symmetric_turn
 from gpca.objects.canonical import CanonicalFrame
 from gpca.pairs.perturbation import CONCEPTS
@@ -139,10 +140,11 @@ class FittingPose:
     def words(self, unit: str, fits: str) -> str:
         """Describe the pose relative to the result, after the verb `fits`."""
         if self.registered:
-            return f"{fits} as registered, within {self.apart:.2g} {unit}"
+            return f"{fits} as registered, within {in_decimals(self.apart)} {unit}"
         if self.turn_deg < SMALL_TURN_DEG:
-            return f"{fits} moved by {self.shift:.2g} {unit}"
-        return f"{fits} turned by {self.turn_deg:.0f}° about {axis_in_words(self.axis)}, {self.shift:.2g} {unit} away"
+            return f"{fits} moved by {in_decimals(self.shift)} {unit}"
+        turn = f"turned by {self.turn_deg:.0f}° about {axis_in_words(self.axis)}"
+        return f"{fits} {turn}, {in_decimals(self.shift)} {unit} away"
 
 
 def axis_in_words(axis: Sequence[float]) -> str:
@@ -208,8 +210,8 @@ class Reenacted:
 
     def effects_line(self, unit: str) -> str:
         """One line of text on the effects of the causes."""
-        effects = ", ".join(f"{cause} {effect:.2g}" for cause, effect in self.effects.items())
-        return f"effects   on the re-enacted error of {self.error:.2g} {unit}: {effects}"
+        effects = ", ".join(f"{cause} {in_decimals(effect)}" for cause, effect in self.effects.items())
+        return f"effects   on the re-enacted error of {in_decimals(self.error)} {unit}: {effects}"
 
     def pose_lines(self, subject: str, unit: str) -> list[str]:
         """One line of text per hypothesis."""
@@ -219,7 +221,7 @@ class Reenacted:
     def lines(self, unit: str) -> list[str]:
         """Lines of text."""
         parts = f"{self.outliers:.0%} outliers, {self.missing:.0%} of the surface missing"
-        observed = f"observed  noise of {self.noise:.2g} {unit}, {parts}"
+        observed = f"observed  noise of {in_decimals(self.noise)} {unit}, {parts}"
         return [self.effects_line(unit), observed, *self.pose_lines("the object", unit)]
 
 
@@ -270,6 +272,6 @@ class Diagnosis:
             f"failure   probability {self.failure:.3f}, called a failure from {self.threshold:.3f}",
             *(self.guarantee.lines() if self.guarantee else ["set       none, since nothing is promised"]),
             f"causes    {', '.join(f'{cause} {share:.3f}' for cause, share in self.causes.items())}, if it failed",
-            f"error     about {self.expected_error:.2g} {unit}",
+            f"error     about {in_decimals(self.expected_error)} {unit}",
             *self.reenacted.lines(unit),
         ]

@@ -16,6 +16,8 @@ from gpca.io.files import whole_file
 from gpca.model import page
 from gpca.model.diagnosis import ADVICE, CHECK, UNKNOWN, Diagnosis, Reenacted, plain
 from gpca.model.scene import Scene
+from gpca.numerals import in_decimals
+from gpca.rigid import as_rows
 
 NOT_SURE = "not sure"
 LEARNED = (
@@ -89,10 +91,17 @@ class ExplainedRegistration:
         """Return the page for a notebook."""
         return page.framed(self.html())
 
+    def pose_rows(self) -> list[str]:
+        """Return `T_target_source` as text, row by row, so that it moves the points as the pose itself does."""
+        if self.scene is None:
+            return as_rows(self.T_target_source, np.inf)
+        frame, shift_3 = self.scene.frame, self.T_target_source[:3, 3]
+        farthest = sum(map(np.linalg.norm, (frame.center_3, shift_3))) + frame.diameter
+        return as_rows(self.T_target_source, float(farthest / frame.diameter))
+
     def _report(self, body: Sequence[str], registration: str, *end: str) -> str:
         warnings = [f"warning   {line}" for line in self.warnings]
-        rows = [" ".join(f"{number:12.6g}" for number in row) for row in self.T_target_source]
-        pose = ["", f"T_target_source, in {self.unit}", *rows]
+        pose = ["", f"T_target_source, in {self.unit}", *self.pose_rows()]
         return "\n".join([*warnings, *body, "", f"registration   {self.method}, {registration}", *pose, *end, ""])
 
 
@@ -145,7 +154,7 @@ class Explanation(ExplainedRegistration):
         body += [
             page.counterfactuals(scene, self.unit) if scene else "",
             "" if self.unknown else page.as_in_the_paper(explained),
-            page.details(explained, {"training": self.learned_from} | dict(names or {})),
+            page.details(explained, {"training": self.learned_from} | dict(names or {}), self.pose_rows()),
         ]
         head = page.headline(explained) + page.warnings(self.warnings)
         return page.assembled("Registration explained", head, body, scene, self.unit)
@@ -165,9 +174,9 @@ class Explanation(ExplainedRegistration):
                 *(f"{name:10}{self.scores[name]:8.3f}{self.variances[name]:10.4f}" for name in self.scores),
                 f"entropy {self.entropy:.3f} nats, BALD {self.bald:.3f} nats",
             ]
-        lines = [f"fitness {self.fitness:.3f}, inlier RMSE {self.inlier_rmse:.4g} {self.unit}"]
+        lines = [f"fitness {self.fitness:.3f}, inlier RMSE {in_decimals(self.inlier_rmse, 4)} {self.unit}"]
         if self.spread is not None:
-            scatter = f"{self.spread.rotation_deg:.2f}°, {self.spread.translation:.4g} {self.unit}"
+            scatter = f"{self.spread.rotation_deg:.2f}°, {in_decimals(self.spread.translation, 4)} {self.unit}"
             by = f"over {self.spread.starts} starts" if self.spread.starts else f"by {self.spread.estimator}"
             lines.append(f"pose spread    {scatter} (root mean square {by})")
         stages = ", ".join(f"{stage} {1e3 * seconds:.1f}" for stage, seconds in self.seconds.items())
@@ -216,7 +225,7 @@ class ScanExplanation(ExplainedRegistration):
             page.section("Overlap", f"<p>{escape(self._overlap())}.</p>"),
             page.poses(self.reenacted, "the source", self.unit),
             page.counterfactuals(scene, self.unit, SCANS_WITHOUT) if scene else "",
-            page.details(explained, inputs),
+            page.details(explained, inputs, self.pose_rows()),
         ]
         head = f'<h1 class="{tone}">{title}</h1><p>{escape(doubt)}</p>{page.warnings(self.warnings)}'
         return page.assembled("Scans explained", head, body, scene, self.unit)

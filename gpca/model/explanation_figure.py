@@ -10,6 +10,7 @@ import numpy as np
 from gpca.causes.truth import BY_SIZE
 from gpca.model.explanation import Explanation
 from gpca.model.scene import taken_out
+from gpca.numerals import in_decimals
 from gpca.reporting.figures import style
 from gpca.reporting.figures.cloud_views import thinned, widest_views
 from gpca.rigid import transform
@@ -67,7 +68,8 @@ def draw_explanation(explanation: Explanation, png_path: str | Path, names: str 
     bars = {"xerr": deviations, "color": bar_colors, "height": 0.6, "error_kw": {"elinewidth": 0.8}}
     left.barh(np.arange(len(shares))[::-1], [*shares.values()], **bars)
     effects = diagnosis.reenacted.effects if diagnosis else {}
-    labels = [f"{name}\n{effects[name]:+.2g} {explanation.unit}" if name in effects else name for name in shares]
+    added = {name: f"\n{in_decimals(effect)} {explanation.unit}" for name, effect in effects.items()}
+    labels = [f"{name}{added.get(name, '')}" for name in shares]
     left.set_yticks(np.arange(len(shares))[::-1], labels)
     left.set(xlim=(0, 1), xlabel="probability", title="causes, if it failed, and what each adds")
     if scene.possibilities:

@@ -17,6 +17,7 @@ from gpca.evaluation.conformal import ALARM, GOOD
 from gpca.guarantee.guarantee import STATES
 from gpca.model.diagnosis import IN_WORDS, UNKNOWN, Diagnosis, Guaranteed, Reenacted
 from gpca.model.scene import ASSETS, WITHOUT, Scene, taken_out
+from gpca.numerals import in_decimals
 
 FRAME_HEIGHT = 900  # of a notebook's frame, pixels
 SHOW = 'openView().load(JSON.parse(document.getElementById("scene").textContent));\n'
@@ -164,14 +165,14 @@ def as_in_the_paper(explained: Mapping) -> str:
     return section("GP-CA as in the paper", f'{"".join(bars)}<p class="note">{note}</p>')
 
 
-def details(explained: Mapping, names: Mapping[str, str]) -> str:
+def details(explained: Mapping, names: Mapping[str, str], pose_rows: Sequence[str]) -> str:
     rmse = length(explained["inlier_rmse"], explained["unit"])
     rows = {name.capitalize(): value for name, value in names.items() if value} | {
         "Registration": f"{explained['method']}, fitness {explained['fitness']:.3f}, inlier RMSE {rmse}",
         "Unit": explained["unit"],
     }
     listed = "".join(f"<dt>{escape(name)}</dt><dd>{escape(str(value))}</dd>" for name, value in rows.items())
-    matrix = "\n".join(" ".join(f"{number:12.6g}" for number in row) for row in explained["T_target_source"])
+    matrix = "\n".join(pose_rows)
     notes = "".join(f"<li>{escape(note)}</li>" for note in explained["notes"])
     body = f"<dl>{listed}</dl><p>T_target_source</p><pre>{matrix}</pre>" + (f"<ul>{notes}</ul>" if notes else "")
     return section("Details", body)
@@ -193,7 +194,7 @@ def bar(name: str, share: float, variance: float, note: str) -> str:
 
 
 def length(value: float, unit: str) -> str:
-    return f"{value:.2g} {unit}"
+    return f"{in_decimals(value)} {unit}"
 
 
 def sentence(text: str) -> str:

@@ -26,6 +26,7 @@ from gpca.model.diagnosis import CHECK, Reenacted
 from gpca.model.explanation import NOT_SURE, ScanExplanation
 from gpca.model.scan_registration import Scans, in_voxels, voxel_size
 from gpca.model.scene import Scene
+from gpca.numerals import in_decimals
 from gpca.objects.canonical import CanonicalFrame, diameter, require_cloud_points
 from gpca.objects.surface import as_points, meters_per
 from gpca.pairs.distances import ObservedPair
@@ -127,10 +128,11 @@ def _prepared(
     notes = []
     for name, points in clouds.items():
         thinned = clouds[name] = in_voxels(points, voxel, name, unit)
-        notes.append(f"{name}: {len(thinned)} of {len(points)} points, means over voxels of {voxel:.3g} {unit}")
+        edge = f"{in_decimals(voxel, 3)} {unit}"
+        notes.append(f"{name}: {len(thinned)} of {len(points)} points, means over voxels of {edge}")
         if len(thinned) < FEWEST_VOXELS:
             remedy = f"give both in one unit, and voxels so small that it fills {FEWEST_VOXELS}"
-            raise InputError(name, f"fills {len(thinned)} voxels of {voxel:.3g} {unit}", remedy)
+            raise InputError(name, f"fills {len(thinned)} voxels of {edge}", remedy)
         diameter(thinned, name)  # raises an InputError for points on one line
     low, high = np.quantile(clouds["target"], (OUTSIDE, 1 - OUTSIDE), axis=0)
     frame = CanonicalFrame((low + high) / 2, float(np.sqrt(np.square(high - low).sum())))

@@ -15,6 +15,7 @@ from gpca.alignment.icp import ICPSettings, clipped_cost
 from gpca.alignment.methods.interface import Outcome, Pair
 from gpca.alignment.methods.registry import make_method
 from gpca.errors import InputError
+from gpca.numerals import in_decimals
 from gpca.objects.canonical import thin
 from gpca.pairs.distances import ObservedPair
 from gpca.rigid import exp, inverse, scale_translation, transform
@@ -63,7 +64,7 @@ def in_voxels(points: np.ndarray, edge: float, name: str, unit: str) -> np.ndarr
         extent_3 = np.ptp(points, axis=0)
         cells = (extent_3 / edge + 1).prod()
     if not cells < MOST_CELLS:
-        fault = f"spans {extent_3.max():.3g} {unit}, too much for voxels of {edge:.3g} {unit}"
+        fault = f"spans {in_decimals(extent_3.max(), 3)} {unit}, too much for voxels of {in_decimals(edge, 3)} {unit}"
         raise InputError(name, fault, "leave out points that are far away")
     return voxels(points, edge)
 

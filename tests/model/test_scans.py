@@ -153,7 +153,10 @@ def test_voxels_are_chosen_by_the_spacing_and_leave_few(scans):
     ("change", "message"),
     [
         ({"voxel": 20.0}, "source: fills .* voxels of 20 m; give both in one unit, and voxels so small that"),
-        ({"voxel": 1e-9}, "source: spans .* m, too much for voxels of 1e-09 m; leave out points that are far away"),
+        (
+            {"voxel": 1e-9},
+            "source: spans .* m, too much for voxels of 0.000000001 m; leave out points that are far away",
+        ),
         ({"voxel": -1.0}, "voxel: -1 is no length"),
         ({"method": "nearest"}, "registration method 'nearest': unknown"),
         ({"unit": "feet"}, "unit 'feet'"),
