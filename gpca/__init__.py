@@ -7,6 +7,7 @@ _EXPORTS = {
     "Explainer": "gpca.model.explainer",
     "Explanation": "gpca.model.explanation",
     "explain_scans": "gpca.model.scan_explainer",
+    "judge": "gpca.model.explainer",
     "load": "gpca.tracks.loading",
 }
 __all__ = ["__version__", *_EXPORTS]

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from gpca.alignment.icp import CONVERGED, ICP, ICPSettings, require_cloud
 from gpca.alignment.icp_kernels import LISTED, align_all, plane_all, pull_all
-from gpca.rigid import rigid_motion
+from gpca.rigid import rigid_motion, transform
 
 MOST_LISTS = 1 << 16  # beyond that, queries in new voxels search the cells
 SINGULAR = 1e-10  # eigenvalue, relative to the largest, below which a step leaves its direction alone
@@ -84,13 +84,14 @@ class BatchedICP:
             self._target = make_target(target, settings.correspondence_distance)
         else:
             self._icp = ICP(target, target_normals, settings)
+            self._tree = cKDTree(target)
 
     def register(
         self, source: np.ndarray, T_target_source_init_n: np.ndarray, max_iterations: int | None = None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Align `source` (N, 3) from poses (n, 4, 4): T_target_source (n, 4, 4), fitness (n,), inlier RMSE (n,).
 
-        `max_iterations` overrides the settings' limit of point-to-point runs.
+        `max_iterations` overrides the settings' limit of point-to-point runs; 0 only measures the poses of any method.
         """
         require_cloud("source cloud", source)
         poses_n = np.array(T_target_source_init_n, np.float64)
@@ -100,9 +101,18 @@ class BatchedICP:
             iterations = self._settings.max_iterations if max_iterations is None else max_iterations
             align_all(source, self._target, poses_n, fitness_n, rmse_n, iterations, CONVERGED)
             return poses_n, fitness_n, rmse_n
+        if max_iterations == 0:
+            return poses_n, *self._measured(source, poses_n)
         runs = [self._icp.register(source, pose) for pose in poses_n]
         fitness_n, rmse_n = np.array([(run.fitness, run.inlier_rmse) for run in runs]).T
         return np.array([run.T_target_source for run in runs]), fitness_n, rmse_n
+
+    def _measured(self, source: np.ndarray, poses_n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        reach = self._settings.correspondence_distance
+        distance_n_N = np.stack([self._tree.query(transform(T, source))[0] for T in poses_n])
+        near_n_N = distance_n_N <= reach
+        squares_n = np.where(near_n_N, distance_n_N**2, 0).sum(axis=1)
+        return near_n_N.mean(axis=1), np.sqrt(squares_n / np.maximum(near_n_N.sum(axis=1), 1))
 
 
 def pulls(

@@ -34,6 +34,8 @@ def add_explain_arguments(parser: ArgumentParser) -> None:
     add("source", type=Path, nargs="+", help=f"observed cloud or mesh ({FORMATS})")
     add("target", type=Path, help="reference to which each source is aligned")
     add("--init", type=Path, help="text file with the 4×4 matrix T_target_source, the initial pose")
+    add("--pose", type=Path, help="text file with T_target_source, which is judged as it is: nothing is registered")
+    add("--save-pose", type=Path, metavar="FILE", help="write the pose that fits best, to start from with --init")
     add("--unit", choices=METERS_PER_UNIT, default="m", help="unit of the files and the pose (default m)")
     add("--model", type=Path, help="model file (default: GPCA_MODEL, one in ./results/, or the package's)")
     add("--method", help="registration method, such as gicp (default: the model's ICP)")
@@ -63,7 +65,8 @@ def run_explain(options: Namespace) -> int:
         require_model(path)
     for cloud in (*options.source, options.target):
         require_format(cloud)
-    T_init = read_pose(options.init) if options.init else None
+    given = options.pose or options.init
+    T_init = read_pose(given) if given else None
     if options.scans:
         *sources, target = map(read_scan, (*options.source, options.target))
     else:
@@ -105,6 +108,7 @@ def run_explain(options: Namespace) -> int:
             estimator=options.estimator or MONTE_CARLO,
             method=options.method,
             fast=options.fast,
+            register=options.pose is None,
         )
     status = 0
     for name, source in zip(map(str, options.source), sources, strict=True):
@@ -128,13 +132,17 @@ def _require_options(options: Namespace) -> None:
         if (given := getattr(options, name)) is not None and given is not False:
             fault = "is not for scans" if options.scans else "is for scans alone"
             raise InputError(f"--{name}", fault, "leave it out" if options.scans else "add --scans")
-    for name in ("html", "png"):
+    for name in ("html", "png", "save_pose"):
         if getattr(options, name) and len(options.source) > 1:
-            raise InputError(f"--{name}", "shows one source", "explain one source after the other")
+            fault = f"--{name.replace('_', '-')}"
+            raise InputError(fault, "is for one source", "explain one source after the other")
+    for name in ("init", "method"):
+        if options.pose and getattr(options, name):
+            raise InputError("--pose", f"is judged as it is, without --{name}", "leave one of them out")
     if options.png and find_spec("matplotlib") is None:
         raise InputError("--png", "needs the package matplotlib, which is not installed", "pip install matplotlib")
-    read = [*options.source, options.target, options.init, options.model]
-    outputs = [path for path in (options.html, options.png, options.queue) if path]
+    read = [*options.source, options.target, options.init, options.pose, options.model]
+    outputs = [path for path in (options.html, options.png, options.queue, options.save_pose) if path]
     require_outputs(outputs, [path for path in read if path])
 
 
@@ -151,6 +159,9 @@ def _write(
         print(json.dumps(explanation.as_dict() | names | extra), flush=options.json_lines)
     else:
         print(explanation.text(), end="")
+    if options.save_pose:
+        explanation.save_pose(options.save_pose)
+        print(f"pose {options.save_pose}", file=sys.stderr)
     if options.html:
         explanation.save_html(options.html, names)
         print(f"page {options.html}", file=sys.stderr)

@@ -231,8 +231,8 @@ class Familiarity:
             ranges[name] = ends[0] / margin, ends[1] * margin
         return cls(ranges)
 
-    def warnings(self, source: np.ndarray, target: np.ndarray) -> list[str]:
-        """Return a line for each measure of the pair outside its range; see :func:`measure`."""
+    def warnings(self, source: np.ndarray, target: np.ndarray) -> tuple[list[str], list[str]]:
+        """Return lines for measures of the pair outside their range, of any explanation and of GP-CA's alone."""
         measured = measure(source, target)
         below = {name for name, (low, _) in self.ranges.items() if measured[name] < low}
         above = {name for name, (_, high) in self.ranges.items() if measured[name] > high}
@@ -240,13 +240,15 @@ class Familiarity:
         lines = {
             f"the source is {measured['size']:.2g} times as large as the target; in training it was {between} times: "
             "are both in the same unit and scale?": "size" in below | above,
-            "the source shows the object from all sides, but GP-CA was trained on partial views": "depth" in above,
-            "the source shows the object from one side alone, but GP-CA was trained on clouds that show more of it": (
-                "depth" in below
-            ),
             "the target looks like a view from one side: give the whole object": "closure" in below,
         }
-        return [line for line, holds in lines.items() if holds]
+        gpca_lines = {
+            "the source shows the object from all sides; GP-CA was trained on partial views": "depth" in above,
+            "the source shows the object from one side alone; GP-CA was trained on clouds that show more": "depth"
+            in below,
+        }
+        any_pair, gpca_alone = ([line for line, holds in part.items() if holds] for part in (lines, gpca_lines))
+        return any_pair, gpca_alone
 
 
 class Void(NamedTuple):

@@ -67,15 +67,18 @@ class Diagnoser:
         """Settings of the registrations that a re-enactment repeats."""
         return CauseSettings(**vars(self.runs), moved=self.moved)
 
-    def diagnose(self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray) -> tuple[Diagnosis, list[Enactment]]:
+    def diagnose(
+        self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray, register: bool = True
+    ) -> tuple[Diagnosis, list[Enactment]]:
         """Diagnose a registration, and return its re-enactments; the same clouds give the same numbers.
 
         Args:
             observed: (N, 3) at the initial pose, in diameters and in the model's frame.
             model: (M, 3).
             T_icp: (4, 4) result of ICP, maps the observed cloud to the model.
+            register: whether ICP may end its descent on the drawn points; otherwise the pose is taken as it is.
         """
-        features_F, reenacted, enactments = self.measured(observed, model, T_icp)
+        features_F, reenacted, enactments = self.measured(observed, model, T_icp, register)
         inputs_1_F = self.classifier.normalized(features_F[None])
         judged = self.classifier.judge(inputs_1_F)
         log_error = float(inputs_1_F[0] @ self.error_weights[:-1] + self.error_weights[-1])
@@ -94,7 +97,7 @@ class Diagnoser:
         return diagnosis, enactments
 
     def measured(
-        self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray
+        self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray, register: bool = True
     ) -> tuple[np.ndarray, Reenacted, list[Enactment]]:
         """Return the features (F,) of the pair with the results of ICP from other starts, and its re-enactment."""
         observed, model = (
@@ -103,7 +106,10 @@ class Diagnoser:
         )
         starts_n = exp(generator("diagnosis", "starts").normal(size=(self.runs.starts, 6)) * self.runs.deviation_6())
         starts_n[0] = T_icp
-        T_n, fitness_n, rmse_n = BatchedICP(model, self.runs.icp).register(observed, starts_n)
+        icp = BatchedICP(model, self.runs.icp)
+        T_n, fitness_n, rmse_n = icp.register(observed, starts_n)
+        if not register:
+            T_n[:1], fitness_n[:1], rmse_n[:1] = icp.register(observed, starts_n[:1], max_iterations=0)
         T_back, points = inverse(T_n[0]), transform(T_n[0], observed)
         pair = ObservedPair(points, model, T_back, T_n @ T_back, fitness_n, rmse_n, axes=("diagnosis",))
         surface = ModelSurface(model)

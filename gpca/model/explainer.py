@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from gpca.errors import InputError
 from gpca.model.clouds import OR_SCANS, Clouds, voids_of
 from gpca.model.diagnoser import QUICK_HYPOTHESES, QUICK_POINTS
 from gpca.model.diagnosis import CHECK
-from gpca.model.explanation import Explanation, PoseSpread
+from gpca.model.explanation import GIVEN, Explanation, Motion, PoseSpread
 from gpca.model.file import Model
 from gpca.model.location import model_path
 from gpca.model.scene import Scene
@@ -76,6 +77,7 @@ class Explainer:
         method: str | None = None,
         estimator: str = MONTE_CARLO,
         fast: bool = False,
+        register: bool = True,
     ) -> Explanation:
         """Register the source to the target and explain the result. The same clouds give the same numbers.
 
@@ -92,6 +94,7 @@ class Explainer:
                 ICP, on whose results the classifier was trained.
             estimator: uncertainty estimator (docs/estimators.md) that needs no training registrations. A note states
                 why it failed.
+            register: whether to register; otherwise the initial pose itself is explained, as :meth:`judge` does.
             fast: whether to re-enact fewer points and poses, without a guarantee; it saves a tenth to a fifth of the
                 time.
 
@@ -106,7 +109,7 @@ class Explainer:
             inputs = (source_points, target_points, T_target_source_init, unit, frame)
             clouds = Clouds.prepared(*inputs, self.model.cloud_points, self.model.icp, notes)
         with _timed(seconds, "icp"):
-            outcome = self._aligned(clouds, method, notes)
+            outcome = self._aligned(clouds, method, notes) if register else _as_given(clouds)
         T_found = outcome.T_target_source
         voids = voids_of(clouds.source, clouds.target, outcome.fitness, self.model.familiar)
         diagnosis = None
@@ -114,7 +117,7 @@ class Explainer:
         if diagnose:
             diagnoser = self.model.diagnoser.quick() if fast else self.model.diagnoser
             with _timed(seconds, "diagnosis"):
-                diagnosis, enactments = diagnoser.diagnose(clouds.source, clouds.target, T_found)
+                diagnosis, enactments = diagnoser.diagnose(clouds.source, clouds.target, T_found, register)
             diagnosis = replace(diagnosis.outside(clouds.frame, clouds.T_target_source_init), void=bool(voids))
             notes += [FAST] if fast else []
         with _timed(seconds, "embedding"):
@@ -125,7 +128,8 @@ class Explainer:
         if not np.isfinite(h_1_d).all() or not np.isfinite(numbers).all():
             raise InputError("model", "gives non-finite numbers for these clouds", "use another one")
         with _timed(seconds, "familiarity"):
-            warnings = [*map(str, voids), *self.model.familiar.warnings(clouds.source, clouds.target)]
+            unusual, unusual_to_gpca = self.model.familiar.warnings(clouds.source, clouds.target)
+            warnings = [*map(str, voids), *unusual]
             if diagnosis is not None and diagnosis.unlikeness > 1:
                 warnings.append(
                     f"the pair is {diagnosis.unlikeness:.1f} times as far from the registrations that the diagnosis "
@@ -133,6 +137,9 @@ class Explainer:
                 )
             if T_target_source_init is not None and method is None and self._fits_inverted(clouds, outcome):
                 warnings.append("the inverse of the initial pose fits far better: is it T_source_target?")
+        moved = None
+        if register and T_target_source_init is not None:
+            moved = Motion.of(T_found, clouds.source, clouds.frame.diameter)
         spread = None
         if uncertainty is not None:
             with _timed(seconds, "uncertainty"):
@@ -151,7 +158,8 @@ class Explainer:
             fitness=outcome.fitness,
             inlier_rmse=outcome.inlier_rmse * clouds.frame.diameter,
             diagnosis=diagnosis,
-            method=method or self.model.icp.method,
+            method=(method or self.model.icp.method) if register else GIVEN,
+            moved=moved,
             scores=dict(zip(self.model.gpc.classes, scores_C.tolist(), strict=True)),
             variances=dict(zip(self.model.gpc.classes, variances_C.tolist(), strict=True)),
             bald=float(bald),
@@ -164,6 +172,7 @@ class Explainer:
             seconds=seconds | {"total": perf_counter() - started},
             notes=tuple(notes),
             warnings=tuple(warnings),
+            gpca_warnings=tuple(unusual_to_gpca),
             learned_from=self.model.learning,
             scene=Scene(
                 *(clouds.source, clouds.target, T_found, clouds.frame),
@@ -171,6 +180,12 @@ class Explainer:
                 *((enactments, self.model.diagnoser.truth) if enactments else ()),
             ),
         )
+
+    def judge(
+        self, source_points: np.ndarray, target_points: np.ndarray, T_target_source: np.ndarray, **options: Any
+    ) -> Explanation:
+        """Explain a given pose (4, 4) without registering: is it right? `options` are those of :meth:`explain`."""
+        return self.explain(source_points, target_points, T_target_source, **options, register=False)
 
     def explain_many(
         self,
@@ -265,6 +280,19 @@ class Explainer:
         _, fitness_1, rmse_1 = clouds.icp.register(from_inverse, np.eye(4)[None])
         costs_2 = clipped_cost(np.append(outcome.fitness, fitness_1), np.append(outcome.inlier_rmse, rmse_1), distance)
         return bool(costs_2[1] < INVERSE_COST * costs_2[0])
+
+
+def judge(
+    source_points: np.ndarray, target_points: np.ndarray, T_target_source: np.ndarray, **options: Any
+) -> Explanation:
+    """Judge a pose by the default model, see :meth:`Explainer.judge`; for many pairs, load an explainer once."""
+    return Explainer.load().judge(source_points, target_points, T_target_source, **options)
+
+
+def _as_given(clouds: Clouds) -> Outcome:
+    """Measure the initial pose without moving it."""
+    [T], [fitness], [rmse] = clouds.icp.register(clouds.source, np.eye(4)[None], max_iterations=0)
+    return Outcome(T, float(fitness), float(rmse))
 
 
 @contextmanager

@@ -11,15 +11,17 @@ from typing import ClassVar
 
 import numpy as np
 
+from gpca.alignment.pose_error import displacements
 from gpca.causes.truth import FAILED, NOMINAL
 from gpca.io.files import whole_file
 from gpca.model import page
-from gpca.model.diagnosis import ADVICE, CHECK, UNKNOWN, Diagnosis, Reenacted, plain
+from gpca.model.diagnosis import ADVICE, CHECK, UNKNOWN, Diagnosis, FittingPose, Reenacted, plain
 from gpca.model.scene import Scene
 from gpca.numerals import in_decimals
-from gpca.rigid import as_rows
+from gpca.rigid import as_rows, log
 
 NOT_SURE = "not sure"
+GIVEN = "given"  # method of a pose that was not registered but judged
 LEARNED = (
     "nothing was learned from scans: this is the untrained re-enactment, and the model, which learned from objects, "
     "is not used"
@@ -31,6 +33,20 @@ HEADS = {  # CSS class and title of a state
 }
 PAPER = "GP-CA as in the paper: it sees the aligned source alone and names a concept even where nothing is wrong"
 SCANS_WITHOUT = {"noise": "smoothed points", "pose": "right start", "overlap": "common parts alone"}
+
+
+@dataclass(frozen=True)
+class Motion:
+    """How far a registration moved the source from its initial pose."""
+
+    rotation_deg: float
+    distance: float  # root mean square over the points, in the unit of the points
+
+    @classmethod
+    def of(cls, T_found: np.ndarray, source: np.ndarray, unit: float) -> Motion:
+        """Measure a pose relative to the initial one, for a cloud (N, 3) whose unit has this length."""
+        distance = unit * float(displacements(T_found[None], source)[0])
+        return cls(math.degrees(float(np.linalg.norm(log(T_found[None])[0, :3]))), distance)
 
 
 @dataclass(frozen=True)
@@ -62,12 +78,14 @@ class ExplainedRegistration:
     T_target_source: np.ndarray  # (4, 4) the resulting pose, in the unit of the points
     fitness: float
     inlier_rmse: float
-    method: str  # name of the registration method, or kind of the model's ICP
+    method: str  # name of the registration method, or kind of the model's ICP; `GIVEN` if none was used
     action: str  # what to do next: a branch of the policy (:mod:`gpca.causes.policy`), or `CHECK`
     reason: str  # reason for this action
     unit: str  # unit of all lengths
+    moved: Motion | None = None  # from the initial pose, if one was given and registered from
     notes: tuple[str, ...] = ()  # changes made to the clouds, such as points that were left out
     warnings: tuple[str, ...] = ()  # reasons to doubt the explanation
+    gpca_warnings: tuple[str, ...] = ()  # reasons to doubt GP-CA as in the paper, which is shown beside it
     learned_from: str = ""  # training data
     scene: Scene | None = field(default=None, repr=False, compare=False)  # data of the 3-D view
 
@@ -81,6 +99,22 @@ class ExplainedRegistration:
         values = asdict(replace(self, scene=None), dict_factory=plain)
         del values["scene"]
         return values
+
+    @property
+    def fitting_pose(self) -> np.ndarray:
+        """T_target_source (4, 4) of the pose that fits best: the result, unless another pose is more probable."""
+        poses = self.reenacted_poses
+        return self.T_target_source if not poses or poses[0].registered else poses[0].T_target_source
+
+    @property
+    def reenacted_poses(self) -> Sequence[FittingPose]:
+        """Hypotheses of the true pose, most probable first; none without a re-enactment."""
+        return ()
+
+    def save_pose(self, path: str | Path) -> None:
+        """Write :attr:`fitting_pose` as text, row by row, to its last digit."""
+        with whole_file(path) as partial:
+            np.savetxt(partial, self.fitting_pose, fmt="%.17g")
 
     def save_html(self, path: str | Path, names: Mapping[str, str] | None = None) -> None:
         """Write :meth:`html` to a file."""
@@ -102,6 +136,9 @@ class ExplainedRegistration:
     def _report(self, body: Sequence[str], registration: str, *end: str) -> str:
         warnings = [f"warning   {line}" for line in self.warnings]
         pose = ["", f"T_target_source, in {self.unit}", *self.pose_rows()]
+        if self.moved:
+            distance = page.length(self.moved.distance, self.unit)
+            registration += f"\nmoved          {self.moved.rotation_deg:.3g}° and {distance} from the initial pose"
         return "\n".join([*warnings, *body, "", f"registration   {self.method}, {registration}", *pose, *end, ""])
 
 
@@ -126,6 +163,11 @@ class Explanation(ExplainedRegistration):
     concept: str  # concept with the largest score (Eq. 6).
     spread: PoseSpread | None  # uncertainty of the pose by an estimator, if requested and available
     seconds: dict[str, float]  # duration of each stage, and ``total``
+
+    @property
+    def reenacted_poses(self) -> Sequence[FittingPose]:
+        """Hypotheses of the true pose, most probable first; none without a diagnosis."""
+        return () if self.diagnosis is None or self.unknown else self.diagnosis.reenacted.poses
 
     @property
     def unknown(self) -> bool:
@@ -170,6 +212,7 @@ class Explanation(ExplainedRegistration):
                 action,
                 "",
                 PAPER,
+                *(f"warning   {line}" for line in self.gpca_warnings),
                 f"{'':10}{'score':>8}{'variance':>10}",
                 *(f"{name:10}{self.scores[name]:8.3f}{self.variances[name]:10.4f}" for name in self.scores),
                 f"entropy {self.entropy:.3f} nats, BALD {self.bald:.3f} nats",
@@ -200,6 +243,11 @@ class ScanExplanation(ExplainedRegistration):
     reenacted: Reenacted  # hypotheses of the true pose, and the effect of each cause
     seconds: float  # duration
     learned_from: str = LEARNED  # training data: none
+
+    @property
+    def reenacted_poses(self) -> Sequence[FittingPose]:
+        """Hypotheses of the true pose, most probable first."""
+        return self.reenacted.poses
 
     def text(self) -> str:
         """Return a report for a reader."""

@@ -162,7 +162,8 @@ def counterfactuals(scene: Scene, unit: str, without: Mapping[str, str] = WITHOU
 def as_in_the_paper(explained: Mapping) -> str:
     bars = (bar(name, score, explained["variances"][name], "") for name, score in explained["scores"].items())
     note = "It sees the aligned source alone and names a concept even where nothing is wrong."
-    return section("GP-CA as in the paper", f'{"".join(bars)}<p class="note">{note}</p>')
+    doubts = warnings(explained["gpca_warnings"])
+    return section("GP-CA as in the paper", f'{doubts}{"".join(bars)}<p class="note">{note}</p>')
 
 
 def details(explained: Mapping, names: Mapping[str, str], pose_rows: Sequence[str]) -> str:
@@ -171,6 +172,9 @@ def details(explained: Mapping, names: Mapping[str, str], pose_rows: Sequence[st
         "Registration": f"{explained['method']}, fitness {explained['fitness']:.3f}, inlier RMSE {rmse}",
         "Unit": explained["unit"],
     }
+    if moved := explained["moved"]:
+        distance = length(moved["distance"], explained["unit"])
+        rows["Moved"] = f"{moved['rotation_deg']:.3g}° and {distance} from the initial pose"
     listed = "".join(f"<dt>{escape(name)}</dt><dd>{escape(str(value))}</dd>" for name, value in rows.items())
     matrix = "\n".join(pose_rows)
     notes = "".join(f"<li>{escape(note)}</li>" for note in explained["notes"])

@@ -1,0 +1,77 @@
+"""Whether a given pose is right: nothing is registered, and the pose that fits is handed over."""
+
+import json
+
+import numpy as np
+import pytest
+
+import gpca
+from gpca.__main__ import main
+from gpca.errors import InputError
+from gpca.model.explanation import GIVEN
+from gpca.rigid import exp, transform
+
+
+def shifted(distance):
+    return exp(np.array([[0, 0, 0, distance, 0, 0]]))[0]
+
+
+@pytest.mark.parametrize("distance", [0.0, 0.3])
+def test_the_given_pose_is_judged_and_not_moved(explainer, pair, distance):
+    source, target = pair
+    T_right = explainer.explain(source, target).T_target_source
+    scale = float(np.linalg.norm(np.ptp(target, axis=0)))
+    T = shifted(distance * scale) @ T_right
+    judged = explainer.judge(source, target, T)
+    np.testing.assert_allclose(judged.T_target_source, T, atol=1e-12)
+    assert judged.method == GIVEN
+    assert judged.moved is None
+    near = np.linalg.norm(transform(T, source)[:, None] - target, axis=2).min(axis=1) <= 0.1 * scale
+    assert judged.fitness == pytest.approx(near.mean(), abs=0.05)
+
+
+def test_a_registration_says_how_far_it_moved(explainer, pair):
+    source, target = pair
+    assert explainer.explain(source, target).moved is None  # no initial pose was given
+    T_right = explainer.explain(source, target).T_target_source
+    scale = float(np.linalg.norm(np.ptp(target, axis=0)))
+    moved = explainer.explain(source, target, shifted(0.05 * scale) @ T_right).moved
+    assert moved.distance == pytest.approx(0.05 * scale, rel=0.2)
+    assert moved.rotation_deg < 10
+
+
+def write(folder, source, target, T):
+    np.save(folder / "source.npy", source)
+    np.save(folder / "target.npy", target)
+    np.savetxt(folder / "pose.txt", T)
+
+
+def test_the_command_judges_a_pose_and_saves_the_one_that_fits(pair, saved, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    source, target = pair
+    write(tmp_path, source, target, np.eye(4))
+    words = ["explain", "source.npy", "target.npy", "--model", str(saved), "--json"]
+    assert main([*words, "--pose", "pose.txt", "--save-pose", "fits.txt"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["method"] == GIVEN
+    assert said["T_target_source"] == np.eye(4).tolist()
+    first = said["diagnosis"]["reenacted"]["poses"][0]
+    expected = np.eye(4) if first["registered"] else first["T_target_source"]
+    np.testing.assert_array_equal(np.loadtxt("fits.txt"), expected)
+    assert main([*words, "--init", "fits.txt"]) == 0
+    assert json.loads(capsys.readouterr().out)["moved"]["distance"] >= 0
+
+
+@pytest.mark.parametrize("other", [["--init", "pose.txt"], ["--method", "point_to_point"]])
+def test_a_pose_that_is_judged_has_no_start_and_no_method(other, pair, saved, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path, *pair, np.eye(4))
+    words = ["explain", "source.npy", "target.npy", "--model", str(saved), "--pose", "pose.txt", *other]
+    assert main(words) == 2
+    assert capsys.readouterr().err.startswith(f"gpca explain: --pose: is judged as it is, without {other[0]}; ")
+
+
+def test_a_pose_that_is_no_pose_is_refused(explainer, pair):
+    with pytest.raises(InputError, match="initial pose"):
+        explainer.judge(*pair, np.diag([1.0, 1, -1, 1]))
+    assert "judge" in gpca.__all__
