@@ -18,7 +18,6 @@ from gpca.alignment.icp import clipped_cost
 from gpca.alignment.methods.interface import Outcome, Pair
 from gpca.alignment.methods.registry import make_method
 from gpca.causes.policy import NOTHING, Decision, RecoveryPolicy
-from gpca.causes.settings import Limits
 from gpca.causes.truth import NOMINAL
 from gpca.classifier.scores import entropy
 from gpca.errors import InputError
@@ -29,6 +28,8 @@ from gpca.model.explanation import GIVEN, Explanation, Motion, PoseSpread
 from gpca.model.file import Model
 from gpca.model.location import model_path
 from gpca.model.scene import Scene
+from gpca.model.tolerance import DEFAULT as DEFAULT_TOLERANCE
+from gpca.model.tolerance import Tolerance
 from gpca.objects.canonical import CanonicalFrame, thin
 from gpca.objects.surface import as_points
 from gpca.reenactment.enactment import Enactment
@@ -78,6 +79,7 @@ class Explainer:
         estimator: str = MONTE_CARLO,
         fast: bool = False,
         register: bool = True,
+        tolerance: Tolerance | str = DEFAULT_TOLERANCE,
     ) -> Explanation:
         """Register the source to the target and explain the result. The same clouds give the same numbers.
 
@@ -94,6 +96,7 @@ class Explainer:
                 ICP, on whose results the classifier was trained.
             estimator: uncertainty estimator (docs/estimators.md) that needs no training registrations. A note states
                 why it failed.
+            tolerance: how far the pose may be off: a length, an angle or a share of the diameter, such as ``5mm``.
             register: whether to register; otherwise the initial pose itself is explained, as :meth:`judge` does.
             fast: whether to re-enact fewer points and poses, without a guarantee; it saves a tenth to a fifth of the
                 time.
@@ -108,6 +111,8 @@ class Explainer:
         with _timed(seconds, "preparation"):
             inputs = (source_points, target_points, T_target_source_init, unit, frame)
             clouds = Clouds.prepared(*inputs, self.model.cloud_points, self.model.icp, notes)
+            allowed = tolerance if isinstance(tolerance, Tolerance) else Tolerance.parse(tolerance)
+            limit = allowed.length(clouds.target, clouds.frame.diameter, unit)
         with _timed(seconds, "icp"):
             outcome = self._aligned(clouds, method, notes) if register else _as_given(clouds)
         T_found = outcome.T_target_source
@@ -169,6 +174,7 @@ class Explainer:
             reason=decision.reason,
             spread=spread,
             unit=unit,
+            tolerance=limit,
             seconds=seconds | {"total": perf_counter() - started},
             notes=tuple(notes),
             warnings=tuple(warnings),
@@ -176,7 +182,7 @@ class Explainer:
             learned_from=self.model.learning,
             scene=Scene(
                 *(clouds.source, clouds.target, T_found, clouds.frame),
-                *(self.model.icp.correspondence_distance, Limits().failed),
+                *(self.model.icp.correspondence_distance, limit / clouds.frame.diameter),
                 *((enactments, self.model.diagnoser.truth) if enactments else ()),
             ),
         )

@@ -156,6 +156,7 @@ class Explanation(ExplainedRegistration):
     """
 
     diagnosis: Diagnosis | None  # state and causes, learned from measured causes; None if not requested
+    tolerance: float  # how far the pose may be off, in the unit of the points
     scores: dict[str, float]
     variances: dict[str, float]
     bald: float
