@@ -75,7 +75,7 @@ def on_frames(explainer, options: argparse.Namespace) -> dict[str, float]:
             skipped.append(row)
             continue
         said = explainer.explain(source, target, frame=frame)
-        alarms["diagnosis"].append(said.diagnosis.failure)
+        alarms["diagnosis"].append(said.diagnosis.result)
         alarms["inlier_rmse"].append(registrations.inlier_rmse[row])
         alarms["fitness"].append(-registrations.fitness[row])
         pair = explainer.model.diagnoser.pair(source, target, T_icp)
@@ -100,7 +100,7 @@ def on_frames(explainer, options: argparse.Namespace) -> dict[str, float]:
         result |= {f"auroc_{name}": own}
         if name != "diagnosis":
             result |= {f"gain_over_{name}_low": worse}
-    found = np.array(alarms["diagnosis"]) >= explainer.model.diagnoser.threshold
+    found = np.array(alarms["diagnosis"]) >= explainer.model.diagnoser.at_default.threshold
     print(f"called failed: {found[failed_K].mean():.3f} of the failed, {found[~failed_K].mean():.3f} of the nominal")
     return result | {"found": found[failed_K].mean(), "false_alarms": found[~failed_K].mean()}
 
@@ -136,7 +136,7 @@ def clean_pairs(explainer, options: argparse.Namespace) -> dict[str, float]:
         said = explainer.explain(source, points[order[POINTS : 2 * POINTS]])
         alarms.append(said.diagnosis.state == "failed")
         found = said.diagnosis
-        print(f"{objects.names[i]:40} {found.failure:.3f} {found.state} {' '.join(found.named)}")
+        print(f"{objects.names[i]:40} {found.result:.3f} {found.state} {' '.join(found.named)}")
     return {"clean_pairs": options.pairs, "clean_alarms": sum(alarms)}
 
 

@@ -65,7 +65,7 @@ pairs = {
 for name, said in zip(pairs, explainer.explain_many(pairs.values()), strict=True):
     found = said.diagnosis
     causes = ", ".join(f"{cause} {share:.2f}" for cause, share in found.causes.items())
-    print(f"{name:8} {found.state:8} failure {found.failure:.2f}; {causes}; {said.action} ({said.reason})")
+    print(f"{name:8} {found.state:8} off by 3 % or more: {found.result:.2f}; {causes}; {said.action} ({said.reason})")
 
 # %%
 # One of them in 3-D

@@ -78,10 +78,14 @@ def diagnoser():
     training = TrainingSet(
         features_N_F=random.normal(size=(12, FEATURE_COUNT)) + 3 * failed_N[:, None],
         label_N=label_N,
-        state_N=np.where(failed_N, "several", "nominal"),
+        dominant_N=np.where(failed_N, label_N, "pose"),
         causes_N_3=np.repeat(failed_N[:, None], 3, axis=1),
-        error_N=np.where(failed_N, 0.2, 0.01),
+        shown_error_N=np.where(failed_N, 0.2, 0.005),
         family_N=np.repeat(["box", "can"], 6),
+        distance_N_K=np.where(failed_N, 0.2, 0.004)[:, None] * [1.0, 1.1],
+        weight_N_K=np.tile([0.9, 0.1], (12, 1)),
+        inlier_rmse_N=np.where(failed_N, 0.05, 0.01),
+        fitness_N=np.where(failed_N, 0.6, 1.0),
     )
     gpc = GPCSettings(learning_rate=0.1, iterations=20, inducing=4, draws=50)
     reenactment = ReenactmentSettings(hypotheses=2)

@@ -33,7 +33,7 @@ EXPLAINERS = {
     "reenact": "the re-enactment without learning",
     CEILING: "the truth, measured again",
 }
-HELD_OUT = {
+HELD_OUT = {  # by the mean error over the starts
     "balanced_accuracy": "balanced accuracy",
     "dominant_accuracy": "dominant cause",
     "auroc_failed": "AUROC of failed",
@@ -41,6 +41,13 @@ HELD_OUT = {
     "missed": "failures called nominal",
     "samples": "samples",
     "families": "families",
+}
+HELD_OUT_RESULTS = {  # by the errors of the results
+    "result_auroc_failed": "AUROC of failed",
+    "result_false_alarms": "good ones called failed",
+    "result_missed": "failures called nominal",
+    "result_good": "good ones",
+    "result_samples": "samples",
 }
 MEASURES = {
     "balanced_accuracy": "balanced accuracy",
@@ -139,7 +146,6 @@ def card(
         for license in source.licenses:
             used.setdefault(license, []).append(source.title)
     licenses = [(*license, "; ".join(dict.fromkeys(titles))) for license, titles in used.items()]
-    held_out = [diagnoser.held_out[measure] for measure in HELD_OUT]
     changes = sorted(record["settings"].get("model", {}).get("causes", {}).items())
     fields = limits | {
         "name": name,
@@ -151,9 +157,8 @@ def card(
         "file": _table(["", ""], file.items()),
         "training": _table(["objects", "number", "train"], training),
         "licenses": _table(["dataset", "license", "source of this information", "part of"], licenses),
-        "held_out": _table(
-            [*HELD_OUT.values()], [[f"{value:.0f}" if value >= 2 else f"{value:.3f}" for value in held_out]]
-        ),
+        "held_out": _held_out(diagnoser.held_out, HELD_OUT),
+        "held_out_results": _held_out(diagnoser.held_out, HELD_OUT_RESULTS),
         "changes": "\n".join(f"- `{key}: {json.dumps(value, sort_keys=True)}`" for key, value in changes) or "- none",
         "scores": _scores(sources, scores),
     }
@@ -168,6 +173,11 @@ def card(
             )
         paragraphs.append(text)
     return "\n\n".join(paragraphs) + "\n"
+
+
+def _held_out(held_out: Mapping[str, float], measures: Mapping[str, str]) -> str:
+    values = [held_out[measure] for measure in measures]
+    return _table([*measures.values()], [[f"{value:.0f}" if value >= 2 else f"{value:.3f}" for value in values]])
 
 
 def _scores(sources: Sequence[Source], scores: pd.DataFrame) -> str:
@@ -188,8 +198,9 @@ def _scores(sources: Sequence[Source], scores: pd.DataFrame) -> str:
 
 
 def _limits(model: Model, settings: Mapping) -> dict[str, object]:
-    causes, guarantee = settings["causes"] | settings["model"].get("causes", {}), model.diagnoser.guarantee
-    assert guarantee is not None  # a model file holds one
+    causes, level = settings["causes"] | settings["model"].get("causes", {}), model.diagnoser.at_default
+    if (guarantee := level.guarantee) is None:
+        raise InputError("model", "is of a format that tells no result from its start", "make it again")
     sets, alarm = guarantee.state_sets, guarantee.failure_alarm
     return {
         "failed": f"{causes['limits']['failed']:g}",
@@ -197,7 +208,9 @@ def _limits(model: Model, settings: Mapping) -> dict[str, object]:
         "fewest": causes["points"][0],
         "most": causes["points"][1],
         "icp": model.icp.method,
-        "threshold": f"{model.diagnoser.threshold:.3f}",
+        "tolerances": ", ".join(f"{100 * level.tolerance:g}" for level in model.diagnoser.levels),
+        "threshold": f"{level.threshold:.3f}",
+        "start_threshold": f"{model.diagnoser.start_threshold:.3f}",
         "called_failed": f"{100 * settings['model']['false_alarms']:g}",
         "level": f"{sets.level:g}",
         "counted": f"{guarantee.families} families, family by family" if guarantee.families else "single registrations",

@@ -6,7 +6,7 @@ better than either. Variances and BALD are the processes'.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -76,6 +76,10 @@ class Judgment:
     causes_N_3: np.ndarray  # probability that each concept is one of the causes
     causes_variances_N_3: np.ndarray  # their variances over the posterior draws (Eq. 5).
     bald_N: np.ndarray  # the largest BALD of the four classifiers, nats (Eq. 7).
+
+    def subset(self, rows: np.ndarray) -> Judgment:
+        """Return the given rows."""
+        return Judgment(*(getattr(self, field.name)[rows] for field in fields(Judgment)))
 
 
 class PairClassifier:

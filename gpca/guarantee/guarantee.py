@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from math import inf, isfinite
 from typing import Any
 
@@ -37,6 +37,16 @@ class Guarantee:
     def alarm(self, failure_M: np.ndarray) -> np.ndarray:
         """Return the call of each registration (M,), one of :data:`gpca.evaluation.conformal.OUTCOMES`."""
         return self.failure_alarm.of(failure_M)
+
+    def more_cautious(self, other: Guarantee) -> Guarantee:
+        """Return the larger sets and the rarer calls of two guarantees of the same states."""
+        one, two = self.failure_alarm, other.failure_alarm
+        limits = tuple(map(max, self.state_sets.limits, other.state_sets.limits))
+        bounds = {
+            "good_below": min(one.good_below, two.good_below),
+            "failed_from": max(one.failed_from, two.failed_from),
+        }
+        return replace(self, state_sets=replace(self.state_sets, limits=limits), failure_alarm=replace(one, **bounds))
 
     def to_dict(self) -> dict[str, Any]:
         """Return numbers, words and lists, with None for infinite bounds."""

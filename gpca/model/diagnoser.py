@@ -1,43 +1,52 @@
 """The trained part of a model that diagnoses a registration, and its training on measured causes.
 
-Threshold and guarantee are calibrated on unseen families of shapes: each fold of the families is judged by a classifier
-trained on the others. The final classifier is trained on all.
+Thresholds and guarantees are calibrated on unseen families of shapes: each fold of the families is judged by what was
+trained on the others. The final classifiers are trained on all.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.icp import ICPSettings
 from gpca.causes.dataset import LABELS, Causes, labels_of
+from gpca.causes.descriptors import observed_pair
 from gpca.causes.settings import CauseSettings, Moved
-from gpca.causes.truth import ALL, BORDERLINE, LARGEST_ERROR, NOMINAL
+from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.evaluation.conformal import highest_level
 from gpca.explainers.pair_classifier import Judgment, PairClassifier
-from gpca.guarantee.guarantee import Guarantee, calibrate, states_of
+from gpca.guarantee.guarantee import SEVERAL, Guarantee, calibrate
 from gpca.io.container import Container, array
 from gpca.model.diagnosis import Diagnosis, Guaranteed, Reenacted, state_probabilities
+from gpca.model.result import (
+    DEFAULT_TOLERANCE,
+    TOLERANCES,
+    UNCALIBRATED,
+    Calibrated,
+    Evidence,
+    ResultJudge,
+    calibrated_at,
+)
 from gpca.pairs.distances import ObservedPair
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reenactment.dataset import Reenactments, reenactment_features, row_of
 from gpca.reenactment.enactment import Enactment, reenact
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
-from gpca.rigid import exp, inverse, transform
+from gpca.rigid import exp, inverse, inverses, transform
 from gpca.seeds import generator
 from gpca.uncertainty.settings import UncertaintySettings
 
-SMALLEST_ERROR = 1e-3  # diameters; the spacing of the points hides smaller errors
 READS = "reenacted"  # the name of the features in a model file
 QUICK_POINTS, QUICK_HYPOTHESES = 384, 2  # limits of a quick diagnosis; 256 points give twice as many false alarms
 MOST_REENACTED = 512  # points of a user's cloud; twice as many take twice the time without a gain
-RIDGE = 10.0  # penalty of the regression of the error, in samples
 FOLDS = 3  # of the families
 LEVEL = 0.9  # probability that a set of states contains the true one
 MISSED = 0.05  # largest probability that a failure is called good
@@ -47,28 +56,39 @@ MISSED = 0.05  # largest probability that a failure is called good
 class Diagnoser:
     """Classifiers on the features of a pair, and the settings with which these are measured."""
 
-    classifier: PairClassifier  # of failure and of the causes
-    error_weights: np.ndarray  # (F + 1,) regression of ln error (diameters) on the normalized features, constant last
-    threshold: float  # probability of failure from which a registration is called failed
+    classifier: PairClassifier  # of the start's failure and of the causes
+    start_threshold: float  # probability from which registrations from a start are said to fail
+    judge: ResultJudge  # of the result
+    levels: tuple[Calibrated, ...]  # its thresholds and guarantees at some tolerances
     points: int  # maximum number of points per cloud
     runs: UncertaintySettings  # spread of ICP over other starts
     moved: Moved  # the cloud that ICP moves in a re-enactment
     reenactment: ReenactmentSettings  # search for the true pose
-    guarantee: Guarantee | None  # sets of states and alarm; None in quick diagnoses
     held_out: Mapping[str, float]  # measures of accuracy on unseen families of shapes
 
     def quick(self) -> Diagnoser:
         """Return a diagnoser with fewer points and hypotheses and therefore without a guarantee."""
         reenactment = replace(self.reenactment, hypotheses=min(self.reenactment.hypotheses, QUICK_HYPOTHESES))
-        return replace(self, points=min(self.points, QUICK_POINTS), reenactment=reenactment, guarantee=None)
+        levels = tuple(replace(level, guarantee=None) for level in self.levels)
+        return replace(self, points=min(self.points, QUICK_POINTS), reenactment=reenactment, levels=levels)
 
     @property
     def truth(self) -> CauseSettings:
         """Settings of the registrations that a re-enactment repeats."""
         return CauseSettings(**vars(self.runs), moved=self.moved)
 
+    @property
+    def at_default(self) -> Calibrated:
+        """What holds of results at the default tolerance."""
+        return calibrated_at(self.levels, DEFAULT_TOLERANCE)
+
     def diagnose(
-        self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray, register: bool = True
+        self,
+        observed: np.ndarray,
+        model: np.ndarray,
+        T_icp: np.ndarray,
+        register: bool = True,
+        tolerance: float = DEFAULT_TOLERANCE,
     ) -> tuple[Diagnosis, list[Enactment]]:
         """Diagnose a registration, and return its re-enactments; the same clouds give the same numbers.
 
@@ -77,29 +97,35 @@ class Diagnoser:
             model: (M, 3).
             T_icp: (4, 4) result of ICP, maps the observed cloud to the model.
             register: whether ICP may end its descent on the drawn points; otherwise the pose is taken as it is.
+            tolerance: largest error of a right result, in diameters.
         """
-        features_F, reenacted, enactments = self.measured(observed, model, T_icp, register)
+        features_F, evidence, reenacted, enactments = self.measured(observed, model, T_icp, register)
         inputs_1_F = self.classifier.normalized(features_F[None])
         judged = self.classifier.judge(inputs_1_F)
-        log_error = float(inputs_1_F[0] @ self.error_weights[:-1] + self.error_weights[-1])
+        result_1, level = self.judge.probability(evidence, tolerance), calibrated_at(self.levels, tolerance)
+        promised = level.guarantee and Guaranteed.of(level.guarantee, state_probabilities(judged, result_1))
         diagnosis = Diagnosis(
-            failure=float(judged.failure_N[0]),
-            threshold=self.threshold,
+            result=float(result_1[0]),
+            threshold=level.threshold,
+            tolerance=tolerance,
+            tolerance_share=tolerance,
+            start=float(judged.failure_N[0]),
+            start_threshold=self.start_threshold,
             causes=dict(zip(CONCEPTS, judged.causes_N_3[0].tolist(), strict=True)),
             variances=dict(zip(CONCEPTS, judged.causes_variances_N_3[0].tolist(), strict=True)),
             bald=float(judged.bald_N[0]),
-            expected_error=float(np.clip(np.exp(log_error), SMALLEST_ERROR, LARGEST_ERROR)),
+            expected_error=float(self.judge.error(evidence)[0]),
             unlikeness=float(self.classifier.unlikeness(inputs_1_F)[0]),
             void=False,
-            guarantee=Guaranteed.of(self.guarantee, state_probabilities(judged)) if self.guarantee else None,
+            guarantee=promised,
             reenacted=reenacted,
         )
         return diagnosis, enactments
 
     def measured(
         self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray, register: bool = True
-    ) -> tuple[np.ndarray, Reenacted, list[Enactment]]:
-        """Return the features (F,) of the pair with the results of ICP from other starts, and its re-enactment."""
+    ) -> tuple[np.ndarray, Evidence, Reenacted, list[Enactment]]:
+        """Return the features (F,) of the pair and other starts, what is read of the result, and its re-enactment."""
         observed, model = (
             cloud[generator("diagnosis", role).permutation(len(cloud))[: self.points]]
             for role, cloud in (("observed", observed), ("model", model))
@@ -116,21 +142,23 @@ class Diagnoser:
         enactments = reenact(pair, self.reenactment, self.truth, surface)
         row = row_of(enactments, pair, self.reenactment, self.truth)
         reenacted = Reenacted.of(enactments, row["weight"][: len(enactments)], T_icp, surface)
-        return reenactment_features(Reenactments.of_rows([row], self.truth))[0], reenacted, enactments
+        distance_K = surface.errors(T_icp @ inverses(row["T_model_observed"]))
+        evidence = Evidence(distance_K[None], row["weight"][None], rmse_n[:1], fitness_n[:1])
+        return reenactment_features(Reenactments.of_rows([row], self.truth))[0], evidence, reenacted, enactments
 
     def state(self) -> dict[str, object]:
         """Return arrays, numbers and names for :meth:`from_state`."""
         return {
             "reads": READS,
             "classifier": self.classifier.state(),
-            "error_weights": self.error_weights,
-            "threshold": self.threshold,
+            "start_threshold": self.start_threshold,
+            "judge": asdict(self.judge),
+            "levels": [level.state() for level in self.levels],
             "points": self.points,
             "runs": {name: value for name, value in asdict(self.runs).items() if name != "icp"},
             "icp": asdict(self.runs.icp),
             "moved": self.moved,
             "reenactment": asdict(self.reenactment),
-            "guarantee": self.guarantee and self.guarantee.to_dict(),
             "held_out": dict(self.held_out),
         }
 
@@ -139,15 +167,22 @@ class Diagnoser:
         """Return the diagnoser of a :meth:`state`."""
         return cls(
             classifier=PairClassifier.from_state(state["classifier"]),
-            error_weights=state["error_weights"],
-            threshold=state["threshold"],
+            start_threshold=state["start_threshold"],
+            judge=ResultJudge(**state["judge"]),
+            levels=tuple(map(Calibrated.from_state, state["levels"])),
             points=state["points"],
             runs=UncertaintySettings(**state["runs"], icp=ICPSettings(**state["icp"])),
             moved=state["moved"],
             reenactment=ReenactmentSettings(**state["reenactment"]),
-            guarantee=Guarantee.from_dict(state["guarantee"]),
             held_out=state["held_out"],
         )
+
+
+def upgraded(state: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a state of the format before 6: it tells no result from its start, so that its judge is untrained."""
+    kept = {name: part for name, part in state.items() if name not in ("error_weights", "threshold", "guarantee")}
+    judge, levels = asdict(ResultJudge.untrained()), [level.state() for level in UNCALIBRATED]
+    return kept | {"start_threshold": state["threshold"], "judge": judge, "levels": levels}
 
 
 @dataclass(frozen=True)
@@ -155,23 +190,59 @@ class TrainingSet(Container):
     """N registrations with measured causes."""
 
     features_N_F: np.ndarray = array("N F")  # :func:`gpca.reenactment.dataset.reenactment_features`
-    label_N: np.ndarray = array("N")  # nominal, a dominant cause, or borderline
-    state_N: np.ndarray = array("N")  # the label, but ``several`` for failures with several causes
+    label_N: np.ndarray = array("N")  # nominal, a dominant cause, or borderline: by the mean error over the starts
+    dominant_N: np.ndarray = array("N")  # the concept that adds most to that error, in any state
     causes_N_3: np.ndarray = array("N 3")  # whether each concept is a cause
-    error_N: np.ndarray = array("N")  # mean over the starts, diameters
+    shown_error_N: np.ndarray = array("N")  # of the registration itself, diameters
     family_N: np.ndarray = array("N")  # family of the shape
+    distance_N_K: np.ndarray = array("N K")  # as in :class:`gpca.model.result.Evidence`, with the next three
+    weight_N_K: np.ndarray = array("N K")
+    inlier_rmse_N: np.ndarray = array("N")
+    fitness_N: np.ndarray = array("N")
 
     @classmethod
     def of(cls, causes: Causes, reenactments: Reenactments) -> TrainingSet:
         """Return the training set of one source."""
-        truth = causes.truth
-        features, label_N, state_N = reenactment_features(reenactments), labels_of(truth), states_of(truth)
-        return cls(features, label_N, state_N, truth.causes, truth.error[:, ALL], causes.registrations.cluster)
+        truth, distances = causes.truth, []
+        for row, T_K in enumerate(reenactments.T_model_observed):
+            pair = observed_pair(causes, row)
+            distances.append(ModelSurface(pair.model).errors(inverses(T_K @ pair.T_init)))
+        return cls(
+            features_N_F=reenactment_features(reenactments),
+            label_N=labels_of(truth),
+            dominant_N=truth.dominant,
+            causes_N_3=truth.causes,
+            shown_error_N=causes.error_shown,
+            family_N=causes.registrations.cluster,
+            distance_N_K=np.array(distances),
+            weight_N_K=reenactments.weight,
+            inlier_rmse_N=causes.inlier_rmse_runs[:, 0],
+            fitness_N=causes.fitness_runs[:, 0],
+        )
+
+    @property
+    def evidence(self) -> Evidence:
+        """What is read of the results."""
+        return Evidence(self.distance_N_K, self.weight_N_K, self.inlier_rmse_N, self.fitness_N)
+
+    def states_within(self, tolerance: float) -> np.ndarray:
+        """Return the states (N,) of the results; ``borderline`` where too little shape holds a failed one."""
+        several_N = self.causes_N_3.sum(axis=1) > 1
+        good_N, free_N = self.shown_error_N <= tolerance, self.dominant_N == GEOMETRY
+        return np.select([good_N, free_N, several_N], [NOMINAL, BORDERLINE, SEVERAL], self.dominant_N)
 
     def classifier(self, gpc: GPCSettings, *axes: object) -> PairClassifier:
         """Train a classifier."""
         made = PairClassifier(gpc, *axes, trees=True)
         return made.fit(self.features_N_F, self.label_N != NOMINAL, self.causes_N_3)
+
+    def folds(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Yield rows for training and rows of other families; an InputError if there is a single family."""
+        from sklearn.model_selection import GroupKFold
+
+        if (families := len(np.unique(self.family_N))) < 2:
+            raise InputError("model", "learns from objects of a single family", "add a source of others")
+        yield from GroupKFold(min(FOLDS, families)).split(self.label_N, groups=self.family_N)
 
 
 def learn(
@@ -184,70 +255,102 @@ def learn(
 ) -> tuple[Diagnoser, np.ndarray]:
     """Return the trained diagnoser, and the BALD (nats) of failures of unseen families.
 
-    At most the share `false_alarms` of nominal registrations of unseen families reaches the threshold of failure.
+    At most the share `false_alarms` of registrations of unseen families that are right reaches a threshold: of those
+    with a nominal mean error that of the start, and of those within a tolerance that of the result.
     """
-    clear = training.subset(training.label_N != BORDERLINE)
-    judged = judged_unseen(clear, gpc, *axes)
-    nominal_N = clear.label_N == NOMINAL
-    threshold = threshold_of(judged.failure_N[nominal_N], false_alarms)
-    classifier = clear.classifier(gpc, *axes)
-    # Sets of states hold for new families if there are enough families. The alarm's level is too high for their number:
-    # it is calibrated on single samples, and holds as far as registrations of a new family are like the others.
-    scores_N_5 = state_probabilities(judged)
-    family_N = clear.family_N if highest_level(clear.family_N) >= LEVEL else None
-    by_family, single = (
-        calibrate(scores_N_5, clear.state_N, families, level=LEVEL, missed=MISSED, false_alarms=false_alarms)
-        for families in (family_N, None)
+    judged, result_T_N = judged_unseen(training, gpc, *axes)
+    clear_N, nominal_N = training.label_N != BORDERLINE, training.label_N == NOMINAL
+    start_threshold = threshold_of(judged.failure_N[nominal_N], false_alarms)
+    levels = tuple(
+        calibrated(training, judged, result_N, tolerance, false_alarms)
+        for tolerance, result_N in zip(TOLERANCES, result_T_N, strict=True)
     )
+    default = TOLERANCES.index(DEFAULT_TOLERANCE)
     diagnoser = Diagnoser(
-        classifier=classifier,
-        error_weights=fit_error(classifier.normalized(training.features_N_F), training.error_N),
-        threshold=threshold,
+        classifier=training.subset(clear_N).classifier(gpc, *axes),
+        start_threshold=start_threshold,
+        judge=ResultJudge.fit(training.evidence, training.shown_error_N),
+        levels=levels,
         points=min(causes.points[1], MOST_REENACTED),
         runs=causes.runs(),
         moved=causes.moved,
         reenactment=reenactment,
-        guarantee=Guarantee(by_family.state_sets, single.failure_alarm, by_family.samples, by_family.families),
-        held_out=measured(clear, judged, threshold),
+        held_out=measured(training.subset(clear_N), judged.subset(clear_N), start_threshold)
+        | measured_results(training.shown_error_N > DEFAULT_TOLERANCE, result_T_N[default], levels[default].threshold),
     )
-    return diagnoser, judged.bald_N[~nominal_N]
+    return diagnoser, judged.bald_N[clear_N & ~nominal_N]
 
 
-def judged_unseen(training: TrainingSet, gpc: GPCSettings, *axes: object) -> Judgment:
-    """Judge every registration by a classifier trained on other families; an InputError if there is a single one."""
-    from sklearn.model_selection import GroupKFold
+def judged_unseen(training: TrainingSet, gpc: GPCSettings, *axes: object) -> tuple[Judgment, np.ndarray]:
+    """Judge every registration by what was trained on other families: its start and causes, and its result.
 
+    The probabilities of the results (T, N) are at `TOLERANCES`. Classifiers do not learn from borderline registrations.
+    """
     count = len(training.label_N)
-    if (families := len(np.unique(training.family_N))) < 2:
-        raise InputError("model", "learns from objects of a single family", "add a source of others")
     shapes = {"failure_N": (), "causes_N_3": (3,), "causes_variances_N_3": (3,), "bald_N": ()}
     parts = {name: np.full((count, *shape), np.nan) for name, shape in shapes.items()}
-    folds = GroupKFold(min(FOLDS, families)).split(training.label_N, groups=training.family_N)
-    for fold, (seen, unseen) in enumerate(folds):
-        classifier = training.subset(seen).classifier(gpc, *axes, "calibration", fold)
-        judged = classifier.judge(classifier.normalized(training.features_N_F[unseen]))
+    result_T_N = np.full((len(TOLERANCES), count), np.nan)
+    for fold, (seen, unseen) in enumerate(training.folds()):
+        learned, asked = training.subset(seen), training.subset(unseen)
+        clear = learned.subset(learned.label_N != BORDERLINE)
+        classifier = clear.classifier(gpc, *axes, "calibration", fold)
+        judged = classifier.judge(classifier.normalized(asked.features_N_F))
         for name, part in parts.items():
             part[unseen] = getattr(judged, name)
-    return Judgment(**parts)
+        judge = ResultJudge.fit(learned.evidence, learned.shown_error_N)
+        result_T_N[:, unseen] = [judge.probability(asked.evidence, tolerance) for tolerance in TOLERANCES]
+    return Judgment(**parts), result_T_N
+
+
+def calibrated(
+    training: TrainingSet, judged: Judgment, result_N: np.ndarray, tolerance: float, false_alarms: float
+) -> Calibrated:
+    """Calibrate what is said of results at a tolerance, by judgments of unseen families.
+
+    Sets of states hold for new families if there are enough families. The alarm's level is too high for their number:
+    it is calibrated on single samples, and holds as far as registrations of a new family are like the others.
+    """
+    state_N = training.states_within(tolerance)
+    threshold = threshold_of(result_N[state_N == NOMINAL], false_alarms)
+    scores_N_5 = state_probabilities(judged, result_N)
+    family_N = training.family_N if highest_level(training.family_N) >= LEVEL else None
+    by_family, single = (
+        calibrate(scores_N_5, state_N, families, level=LEVEL, missed=MISSED, false_alarms=false_alarms)
+        for families in (family_N, None)
+    )
+    guarantee = Guarantee(by_family.state_sets, single.failure_alarm, by_family.samples, by_family.families)
+    return Calibrated(tolerance, threshold, guarantee)
 
 
 def measured(training: TrainingSet, judged: Judgment, threshold: float) -> dict[str, float]:
-    """Measures of accuracy (docs/causes.md) for the card of the model."""
-    from sklearn.metrics import roc_auc_score
-
+    """Measures of accuracy (docs/causes.md) by the mean error over the starts, for the card of the model."""
     failed_N = training.label_N != NOMINAL
     scores_N_4 = np.column_stack([1 - judged.failure_N, judged.failure_N[:, None] * judged.causes_N_3])
     right_N = np.array(LABELS)[scores_N_4.argmax(axis=1)] == training.label_N
     present = [label for label in LABELS if (training.label_N == label).any()]
     first_N = np.array(LABELS[1:])[judged.causes_N_3.argmax(axis=1)]
-    alarm_N = judged.failure_N >= threshold
-    both = failed_N.any() and not failed_N.all()
     return {
         "samples": float(len(failed_N)),
         "families": float(len(np.unique(training.family_N))),
         "balanced_accuracy": float(np.mean([right_N[training.label_N == label].mean() for label in present])),
         "dominant_accuracy": float((first_N == training.label_N)[failed_N].mean()) if failed_N.any() else 0.0,
-        "auroc_failed": float(roc_auc_score(failed_N, judged.failure_N)) if both else 0.5,
+        **alarms(failed_N, judged.failure_N, threshold),
+    }
+
+
+def measured_results(off_N: np.ndarray, result_N: np.ndarray, threshold: float) -> dict[str, float]:
+    """The same by the errors of the results themselves, of all registrations."""
+    counts = {"result_samples": float(len(off_N)), "result_good": float((~off_N).sum())}
+    return counts | {f"result_{name}": value for name, value in alarms(off_N, result_N, threshold).items()}
+
+
+def alarms(failed_N: np.ndarray, probability_N: np.ndarray, threshold: float) -> dict[str, float]:
+    """Return how well a probability tells failures, and what an alarm from a threshold on gets wrong."""
+    from sklearn.metrics import roc_auc_score
+
+    alarm_N, both = probability_N >= threshold, failed_N.any() and not failed_N.all()
+    return {
+        "auroc_failed": float(roc_auc_score(failed_N, probability_N)) if both else 0.5,
         "false_alarms": float(alarm_N[~failed_N].mean()),
         "missed": float((~alarm_N)[failed_N].mean()) if failed_N.any() else 0.0,
     }
@@ -258,11 +361,3 @@ def threshold_of(failure_N: np.ndarray, false_alarms: float) -> float:
     if not len(failure_N):
         raise InputError("model", "has no nominal registration", "raise causes.train or causes.shares.nominal")
     return float(np.nextafter(np.quantile(failure_N, 1 - false_alarms, method="inverted_cdf"), 1))
-
-
-def fit_error(inputs_N_F: np.ndarray, error_N: np.ndarray) -> np.ndarray:
-    """Fit a ridge regression of ln error on normalized features: weights (F + 1,), the constant last."""
-    from sklearn.linear_model import Ridge
-
-    fitted = Ridge(alpha=RIDGE).fit(inputs_N_F, np.log(np.maximum(error_N, SMALLEST_ERROR)))
-    return np.append(fitted.coef_, fitted.intercept_)

@@ -83,8 +83,8 @@ class Guaranteed:
         return [f"set       {states} ({self.level:.0%} of such sets hold the truth)", f"alarm     {self.call} ({why})"]
 
 
-def state_probabilities(judged: Judgment) -> np.ndarray:
-    """Return probabilities (N, 5) of :data:`gpca.guarantee.guarantee.STATES` that sum to 1.
+def state_probabilities(judged: Judgment, result_N: np.ndarray) -> np.ndarray:
+    """Return probabilities (N, 5) of :data:`gpca.guarantee.guarantee.STATES` that sum to 1, for failed results' (N,).
 
     Causes are assumed to be independent, given a failure. The probability that a failure has no cause is distributed
     over the causes in proportion to their probabilities, since a failure without a cause above the limit is labeled by
@@ -97,8 +97,7 @@ def state_probabilities(judged: Judgment) -> np.ndarray:
     several_N_1 = np.maximum(1 - none_N_1 - alone_N_3.sum(axis=1, keepdims=True), 0)
     share_N_3 = causes_N_3 / causes_N_3.sum(axis=1, keepdims=True)
     if_failed_N_4 = np.hstack([alone_N_3 + none_N_1 * share_N_3, several_N_1])
-    failure_N_1 = judged.failure_N[:, None]
-    return np.hstack([1 - failure_N_1, failure_N_1 * if_failed_N_4])
+    return np.hstack([1 - result_N[:, None], result_N[:, None] * if_failed_N_4])
 
 
 @dataclass(frozen=True)
@@ -229,12 +228,16 @@ class Reenacted:
 class Diagnosis:
     """The diagnosis of one registration."""
 
-    failure: float  # probability of a failure
-    threshold: float  # probability from which the state is failed
+    result: float  # probability that this pose is off by more than the tolerance
+    threshold: float  # of the result, from which the state is failed
+    tolerance: float  # largest error of a right result
+    tolerance_share: float  # the same in diameters of the target
+    start: float  # probability that registrations from starts like this one fail
+    start_threshold: float  # from which the start is called bad
     causes: dict[str, float]  # probability of each concept to be a cause, given a failure
     variances: dict[str, float]  # their variances over the posterior draws (Eq. 5).
     bald: float  # largest BALD among the questions, nats (Eq. 7).
-    expected_error: float  # expected error of the pose: ADD, or ADD-S of a symmetric object
+    expected_error: float  # expected error of this pose: ADD, or ADD-S of a symmetric object
     unlikeness: float  # distance to the training samples, scaled so that 1 % of them exceed 1
     void: bool  # whether the pair is such that no number here means anything (:mod:`gpca.model.clouds`)
     guarantee: Guaranteed | None  # set of states and alarm; None in fast diagnoses
@@ -245,7 +248,16 @@ class Diagnosis:
         """``nominal``, ``failed`` or ``unknown``."""
         if self.void:
             return UNKNOWN
-        return NOMINAL if self.failure < self.threshold else FAILED
+        return NOMINAL if self.result < self.threshold else FAILED
+
+    @property
+    def remark(self) -> str:
+        """What to know of a result that is right."""
+        if self.start < self.start_threshold:
+            return "nothing is wrong"
+        return (
+            "this result is right, but registrations from such starts often fail: start closer or search more broadly"
+        )
 
     @property
     def named(self) -> tuple[str, ...]:
@@ -258,7 +270,8 @@ class Diagnosis:
     def outside(self, frame: CanonicalFrame, T_target_source_init: np.ndarray) -> Diagnosis:
         """Convert from the target's canonical frame to the user's frame and unit of length."""
         reenacted = self.reenacted.outside(frame, T_target_source_init)
-        return replace(self, expected_error=self.expected_error * frame.diameter, reenacted=reenacted)
+        lengths = {name: getattr(self, name) * frame.diameter for name in ("tolerance", "expected_error")}
+        return replace(self, **lengths, reenacted=reenacted)
 
     def as_dict(self) -> dict[str, object]:
         """Values for JSON."""
@@ -267,9 +280,11 @@ class Diagnosis:
     def lines(self, unit: str) -> list[str]:
         """Lines of text, with lengths in this unit."""
         named = " and ".join(self.named) or "nothing is wrong"
+        limit = f"{in_decimals(self.tolerance)} {unit} ({100 * self.tolerance_share:.2g} % of the diameter)"
         return [
             f"state     {self.state}: {named}",
-            f"failure   probability {self.failure:.3f}, called a failure from {self.threshold:.3f}",
+            f"result    probability {self.result:.2f} that the pose is off by more than {limit}",
+            f"start     registrations from such starts fail with probability {self.start:.2f}",
             *(self.guarantee.lines() if self.guarantee else ["set       none, since nothing is promised"]),
             f"causes    {', '.join(f'{cause} {share:.3f}' for cause, share in self.causes.items())}, if it failed",
             f"error     about {in_decimals(self.expected_error)} {unit}",

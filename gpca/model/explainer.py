@@ -129,7 +129,7 @@ class Explainer:
             h_1_d = self.embed(transform(T_found, clouds.source))
         with _timed(seconds, "attribution"):
             (scores_C,), (variances_C,), (bald,) = self.model.gpc.attribute(h_1_d)
-        numbers = [*scores_C, *((diagnosis.failure, *diagnosis.causes.values()) if diagnosis else ())]
+        numbers = [*scores_C, *((diagnosis.result, diagnosis.start, *diagnosis.causes.values()) if diagnosis else ())]
         if not np.isfinite(h_1_d).all() or not np.isfinite(numbers).all():
             raise InputError("model", "gives non-finite numbers for these clouds", "use another one")
         with _timed(seconds, "familiarity"):
@@ -154,7 +154,7 @@ class Explainer:
         elif diagnosis is None:
             decision = self.policy.decide(scores_C, float(bald), concepts=self.model.gpc.classes)
         elif diagnosis.state == NOMINAL:
-            decision = Decision(NOTHING, "", "nothing is wrong")
+            decision = Decision(NOTHING, "", diagnosis.remark)
         else:
             causes = diagnosis.causes
             decision = self.policy.decide(np.array([*causes.values()]), diagnosis.bald, concepts=(*causes,))

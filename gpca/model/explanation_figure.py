@@ -86,7 +86,8 @@ def draw_explanation(explanation: Explanation, png_path: str | Path, names: str 
         lines = [f"leading concept: {explanation.concept}"]
     else:
         lines = [f"{diagnosis.state}: {' and '.join(diagnosis.named) or 'nothing is wrong'}"]
-        lines.append(f"probability of failure {diagnosis.failure:.2f}")
+        tolerance = f"{in_decimals(diagnosis.tolerance)} {explanation.unit}"
+        lines.append(f"off by more than {tolerance} with probability {diagnosis.result:.2f}")
         lines += [" ".join(line.split()) for line in (diagnosis.guarantee.lines() if diagnosis.guarantee else [])]
     lines.append(f"action: {explanation.advice} ({explanation.reason})")
     lines += [f"warning: {warning}" for warning in explanation.warnings]

@@ -31,8 +31,9 @@ from gpca.guarantee.guarantee import STATES, Guarantee
 from gpca.io.array_tree import TEXT, read_tree, write_tree
 from gpca.model import torch_file
 from gpca.model.clouds import MEASURES, Familiarity
-from gpca.model.diagnoser import READS, Diagnoser
+from gpca.model.diagnoser import READS, Diagnoser, upgraded
 from gpca.model.location import REMEDY, require_model
+from gpca.model.result import ERROR, PROBABILITY
 from gpca.objects.canonical import FEWEST_CLOUD_POINTS
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reenactment.dataset import DESCRIBED, FEATURES
@@ -40,7 +41,7 @@ from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import read_settings
 from gpca.uncertainty.settings import FEWEST_STARTS, UncertaintySettings
 
-FORMAT, VERSION = "GP-CA model", 5
+FORMAT, VERSION = "GP-CA model", 6
 FEATURE_COUNT = len(FEATURES) + sum(WIDTHS[group] for group in DESCRIBED)  # of a diagnoser
 ASYMMETRY = 1e-9  # of a covariance, whose prior is the identity
 # Upper bounds on the work of one explanation. A score is a mean over the draws of the classifier, so that a million
@@ -110,10 +111,13 @@ class Model:
             raise InputError(path, f"is damaged or not a model{why}", REMEDY) from fault
         if not isinstance(content, Mapping) or content.get("format") != FORMAT:
             raise InputError(path, "is not a model", REMEDY)
-        if (version := content.get("version")) not in (VERSION, torch_file.VERSION):
+        if (version := content.get("version")) not in (VERSION, VERSION - 1, torch_file.VERSION):
             raise InputError(path, f"is a model of version {version}, not {VERSION}", REMEDY)
         try:
-            content = content if version == VERSION else torch_file.upgraded(content)
+            if version == torch_file.VERSION:
+                content = torch_file.upgraded(content)
+            if version != VERSION:
+                content = {**content, "diagnoser": upgraded(content["diagnoser"])}
             encoder_settings = dict(content["encoder_settings"])
             settings = EncoderSettings(draw_points=encoder_settings.pop("points"), **encoder_settings)
             encoder = TrainedEncoder(settings, content["encoder"])
@@ -194,14 +198,20 @@ def _require_diagnoser(state: Mapping) -> None:
     _require_count("iterations of ICP", state["icp"]["max_iterations"], 1, MOST_ITERATIONS)
     _require_count("classifiers of causes", len(classifier["causes"]), len(CONCEPTS), len(CONCEPTS))
     _require_count("re-enactments", settings.calls(starts), 1, MOST_RUNS)
-    quantiles, threshold = classifier["quantiles"], state["threshold"]
+    quantiles, judge, levels = classifier["quantiles"], state["judge"], state["levels"]
     sized = quantiles.ndim == 2 and len(quantiles) > 1 and quantiles.shape[1] == FEATURE_COUNT
     _require(sized, f"'quantiles' has shape {quantiles.shape}, not {FEATURE_COUNT} descriptors")
     _require(not (np.diff(quantiles, axis=0) < 0).any(), "'quantiles' decrease")
     usual = classifier.get("usual_distance", 1.0)
     _require(type(usual) is float and 0 < usual < MOST_DRAWS, f"usual_distance: {usual!r} is not a distance")
-    _require_shape("error_weights", state["error_weights"], (FEATURE_COUNT + 1,))
-    _require(type(threshold) is float and 0 <= threshold <= 2, f"threshold: {threshold!r} is not a probability")
+    for name, numbers in (("weights", PROBABILITY), ("error_weights", ERROR)):
+        _require_shape(name, judge[name], (len(numbers) + 1,))
+    _require(levels and isinstance(levels, list), "no tolerance is calibrated")
+    for level in levels:
+        tolerance = level["tolerance"]
+        _require(type(tolerance) is float and 0 < tolerance <= 1, f"tolerance: {tolerance!r} is not a share")
+    for threshold in (state["start_threshold"], *(level["threshold"] for level in levels)):
+        _require(type(threshold) is float and 0 <= threshold <= 2, f"threshold: {threshold!r} is not a probability")
     causes = [(cause, (ABSENT, PRESENT)) for cause in classifier["causes"]]
     for gpc, classes in [(classifier["failure"], (NOMINAL, FAILED)), *causes]:
         _require_count("draws of a classifier", gpc["settings"]["draws"], 2, MOST_DRAWS)
@@ -210,9 +220,11 @@ def _require_diagnoser(state: Mapping) -> None:
     _require_count("questions of trees", len(classifier["trees"]), 1 + len(CONCEPTS), 1 + len(CONCEPTS))
     for question in classifier["trees"]:
         require_trees(question, FEATURE_COUNT)
-    sets = Guarantee.from_dict(state["guarantee"]).state_sets
-    same = sets.states == STATES and 0 < sets.level < 1 and sets.nonconformity in get_args(Nonconformity)
-    _require(same, "its guarantee is of different states, or of none")
+    for level in levels:
+        if level["guarantee"] is not None:
+            sets = Guarantee.from_dict(level["guarantee"]).state_sets
+            same = sets.states == STATES and 0 < sets.level < 1 and sets.nonconformity in get_args(Nonconformity)
+            _require(same, "its guarantee is of different states, or of none")
     for name, value in state["held_out"].items():
         is_measure = type(name) is str and name.isidentifier() and type(value) is float and 0 <= value < MOST_DRAWS
         _require(is_measure, f"held_out: {str(name)[:40]!r} is not the name of a measure with a value")

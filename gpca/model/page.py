@@ -61,8 +61,11 @@ def headline(explained: Mapping) -> str:
     line = f'<h1 class="{TONES[state]}">{escape(title)}</h1>'
     if state == UNKNOWN:
         return line
-    chance = f"Probability of failure {diagnosis['failure']:.2f}; called a failure from {diagnosis['threshold']:.2f} on"
-    return f"{line}<p>{chance}. Expected error {length(diagnosis['expected_error'], explained['unit'])}.</p>"
+    tolerance, error = (length(diagnosis[name], explained["unit"]) for name in ("tolerance", "expected_error"))
+    chance = f"The pose is off by more than {tolerance} with probability {diagnosis['result']:.2f}"
+    called = f"called failed from {diagnosis['threshold']:.2f} on; expected error {error}"
+    start = f"Registrations from such starts fail with probability {diagnosis['start']:.2f}"
+    return f"{line}<p>{chance}, {called}. {start}.</p>"
 
 
 def warnings(lines: Sequence[str]) -> str:

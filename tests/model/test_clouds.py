@@ -239,7 +239,8 @@ def test_another_scale_is_noticed(learnt, clouds, scale):
 @pytest.mark.parametrize("threshold", [0.0, 2.0])  # of a model that calls everything failed, and nothing
 def test_nothing_is_said_of_a_pair_without_meaning(name, threshold, model, pair):
     change, fault, check = PAIRS[name]
-    diagnoser = replace(model.diagnoser, threshold=threshold)
+    levels = tuple(replace(level, threshold=threshold) for level in model.diagnoser.levels)
+    diagnoser = replace(model.diagnoser, levels=levels)
     said = Explainer(replace(model, diagnoser=diagnoser), device="cpu").explain(*change(*pair))
     assert said.unknown
     assert (said.diagnosis.state, said.diagnosis.named, said.action) == (UNKNOWN, (), CHECK)

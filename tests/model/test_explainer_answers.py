@@ -55,7 +55,9 @@ def test_a_pair_far_from_all_that_the_diagnosis_learnt_is_said_to_be(explainer, 
 
 
 def with_threshold(model, threshold, policy=None):
-    return Explainer(replace(model, diagnoser=replace(model.diagnoser, threshold=threshold)), policy, device="cpu")
+    levels = tuple(replace(level, threshold=threshold) for level in model.diagnoser.levels)
+    diagnoser = replace(model.diagnoser, levels=levels, start_threshold=2.0)
+    return Explainer(replace(model, diagnoser=diagnoser), policy, device="cpu")
 
 
 def test_nothing_is_done_about_what_is_fine(model, pair):
@@ -106,7 +108,7 @@ def test_clouds_of_which_no_surface_can_be_made_are_explained_all_the_same(expla
     cloud = ell(64, 3)
     for target in (np.repeat(cloud, 2, axis=0), cloud * np.array([1, 1, 0.0]), np.repeat(cloud[:5], 20, axis=0)):
         said = explainer.explain(cloud, target).diagnosis
-        assert np.isfinite([said.failure, said.reenacted.error, *said.reenacted.effects.values()]).all()
+        assert np.isfinite([said.result, said.start, said.reenacted.error, *said.reenacted.effects.values()]).all()
 
 
 def test_a_fast_explanation_promises_nothing_and_says_so(explainer, pair):

@@ -8,8 +8,9 @@ import torch
 
 from gpca.errors import InputError
 from gpca.io.array_tree import read_tree, write_tree
-from gpca.model.file import Model
+from gpca.model.file import FEATURE_COUNT, Model
 from gpca.model.location import VARIABLE, model_path
+from gpca.model.result import Evidence
 
 from .conftest import in_version_4
 
@@ -65,7 +66,7 @@ def test_a_file_that_holds_it_four_times_says_the_same_and_is_written_smaller(mo
 
 
 def require_same_judgment(one, other, tolerance=0.0):
-    features = np.random.default_rng(1).normal(size=(4, len(other.diagnoser.error_weights) - 1))
+    features = np.random.default_rng(1).normal(size=(4, FEATURE_COUNT))
     actual, expected = (
         made.classifier.judge(made.classifier.normalized(features)) for made in (one.diagnoser, other.diagnoser)
     )
@@ -74,7 +75,7 @@ def require_same_judgment(one, other, tolerance=0.0):
 
 
 def test_a_file_that_torch_wrote_is_the_same_model(model, path, tmp_path):
-    torch.save(in_version_4(read_tree(path)), tmp_path / "older.pt")
+    torch.save(in_version_4(before_6(read_tree(path))), tmp_path / "older.pt")
     older, features = Model.load(tmp_path / "older.pt"), embeddings(model)
     cloud = np.random.default_rng(0).random((2, 64, 3))
     np.testing.assert_array_equal(older.encoder(cloud), model.encoder(cloud))
@@ -85,6 +86,30 @@ def test_a_file_that_torch_wrote_is_the_same_model(model, path, tmp_path):
     assert classifiers[0].usual_distance == classifiers[1].usual_distance
     older.save(tmp_path / "newer.pt")
     assert set(zipfile.ZipFile(tmp_path / "newer.pt").namelist()) == set(zipfile.ZipFile(path).namelist())
+
+
+def before_6(content):
+    """Return the content of a model that tells no result from its start."""
+    diagnoser = dict(content["diagnoser"])
+    [guarantee, *_] = [level["guarantee"] for level in diagnoser.pop("levels")]
+    del diagnoser["judge"]
+    diagnoser |= {"threshold": diagnoser.pop("start_threshold"), "guarantee": guarantee}
+    return content | {"version": 5, "diagnoser": diagnoser | {"error_weights": np.zeros(FEATURE_COUNT + 1)}}
+
+
+def test_a_model_that_tells_no_result_from_its_start_says_the_weight_of_other_poses_and_promises_nothing(
+    model, path, tmp_path
+):
+    write_tree(tmp_path / "older.pt", before_6(read_tree(path)))
+    older = Model.load(tmp_path / "older.pt").diagnoser
+    assert older.start_threshold == model.diagnoser.start_threshold
+    evidence = Evidence(np.array([[0.01, 0.2]]), np.array([[0.7, 0.3]]), np.array([0.02]), np.array([0.9]))
+    assert older.judge.probability(evidence, 0.03) == pytest.approx(evidence.apart(0.03))
+    assert older.judge.error(evidence) == pytest.approx(0.067)
+    assert [(level.threshold, level.guarantee) for level in older.levels] == [(0.5, None)]
+    assert older.quick().at_default.threshold == 0.5
+    Model.load(tmp_path / "older.pt").save(tmp_path / "newer.pt")
+    assert read_tree(tmp_path / "newer.pt")["version"] == 6
 
 
 def changed(**changes):
@@ -102,8 +127,8 @@ def changed(**changes):
         (lambda path: os.truncate(path, 1000), "is damaged or not a model"),
         (lambda path: path.write_bytes(pickle.dumps(print, protocol=2)), "is damaged or not a model"),
         (lambda path: torch.save({"weights": torch.zeros(3)}, path), "is not a model"),
-        (changed(version=3), "is a model of version 3, not 5; make one with"),
-        (changed(version=7), "is a model of version 7, not 5; make one with"),
+        (changed(version=3), "is a model of version 3, not 6; make one with"),
+        (changed(version=7), "is a model of version 7, not 6; make one with"),
         (changed(gpc=None), "missing or damaged parts .*'gpc'"),
         (changed(encoder={}), "missing or damaged parts"),
     ],

@@ -76,6 +76,11 @@ def trees_of(roots=(0,), feature=(0, -1, -1), number=(0, 1, 2), right=(2, 1, 2))
     return {"baseline": 0.0, **parts}
 
 
+def level(path, value):
+    """Of the first tolerance."""
+    return lambda content: put(path, value)(content["diagnoser"]["levels"][0])
+
+
 CONTENTS = {
     "weights of NaN": lambda content: weight(content).fill(NAN),
     "one weight of infinity": lambda content: weight(content).ravel()[3:4].fill(np.inf),
@@ -134,10 +139,15 @@ CONTENTS = {
     "no settings": drop("encoder_settings"),
     "no thresholds": drop("thresholds"),
     "no title": drop("title"),
-    "another version": put("version", 6),
+    "another version": put("version", 8),
     "another format": put("format", "a model"),
-    "a threshold of failure of NaN": put("diagnoser/threshold", NAN),
-    "errors of other descriptors": put("diagnoser/error_weights", lambda w: w[:-1]),
+    "a threshold of a start of NaN": put("diagnoser/start_threshold", NAN),
+    "a threshold of a result of NaN": level("threshold", NAN),
+    "a negative tolerance": level("tolerance", -0.03),
+    "no tolerance at all": put("diagnoser/levels", []),
+    "results by other numbers": put("diagnoser/judge/weights", lambda w: w[:-1]),
+    "errors by other numbers": put("diagnoser/judge/error_weights", lambda w: w[:-1]),
+    "results by NaN": put("diagnoser/judge/weights", lambda w: NAN * w),
     "quantiles of other descriptors": put("diagnoser/classifier/quantiles", lambda q: q[:, :-1]),
     "quantiles that fall": put("diagnoser/classifier/quantiles", lambda q: q[::-1]),
     "1e9 starts": put("diagnoser/runs/starts", HUGE),
@@ -153,9 +163,9 @@ CONTENTS = {
     "trees of other features": put("diagnoser/classifier/trees", lambda trees: [trees_of(feature=[999, -1, -1])] * 4),
     "trees of NaN": put("diagnoser/classifier/trees", lambda trees: [trees_of(number=[NAN, 0, 0])] * 4),
     "trees of text": put("diagnoser/classifier/trees", [{"roots": "0"}] * 4),
-    "a guarantee of other states": put("diagnoser/guarantee/sets/states", list("abcde")),
-    "a guarantee of NaN": put("diagnoser/guarantee/sets/level", NAN),
-    "a guarantee of nothing": put("diagnoser/guarantee", {"sets": 1}),
+    "a guarantee of other states": level("guarantee/sets/states", list("abcde")),
+    "a guarantee of NaN": level("guarantee/sets/level", NAN),
+    "a guarantee of nothing": level("guarantee", {"sets": 1}),
     "measures of text": put("diagnoser/held_out/samples", "many"),
     "1e9 points of a description": put("diagnoser/points", HUGE),
     "a cause without a classifier": put("diagnoser/classifier/causes", lambda causes: causes[:2]),

@@ -1,0 +1,138 @@
+"""The probability that one pose is off by more than a tolerance, from a re-enactment's hypotheses of the true pose.
+
+It is a logistic regression on a few numbers that are relative to the tolerance, so that any tolerance may be asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import expit, logit
+
+from gpca.causes.truth import LARGEST_ERROR
+from gpca.guarantee.guarantee import Guarantee
+from gpca.io.container import Container, array
+from gpca.reenactment.enactment import Enactment
+from gpca.reenactment.settings import STEEPNESS
+from gpca.reenactment.surface import ModelSurface
+from gpca.rigid import inverses
+
+TOLERANCES = (0.01, 0.02, 0.03, 0.05, 0.1)  # diameters, at which it is trained and calibrated
+DEFAULT_TOLERANCE = 0.03
+SMALLEST = 1e-3  # diameters; the spacing of the points hides smaller distances
+SUREST = 0.998  # largest weight of poses apart from the result: other poses than the hypotheses are possible
+EVEN = 0.5  # threshold of a judge without calibration
+# Rows of weights; the last number of each is the constant.
+PROBABILITY = ("apart", "mean_distance", "first_distance", "inlier_rmse", "fitness", "tolerance")
+ERROR = PROBABILITY[1:5]
+REGULARIZATION = 0.3  # scikit-learn's C, on standardized numbers
+
+
+@dataclass(frozen=True)
+class Evidence(Container):
+    """What is read of N poses, under K hypotheses of the true one each."""
+
+    distance_N_K: np.ndarray = array("N K")  # error of the pose if the hypothesis is true, diameters
+    weight_N_K: np.ndarray = array("N K")  # probabilities of the hypotheses
+    inlier_rmse_N: np.ndarray = array("N")  # diameters
+    fitness_N: np.ndarray = array("N")
+
+    def apart(self, tolerance: float) -> np.ndarray:
+        """Return the weight (N,) of hypotheses that lie farther than the tolerance from the pose."""
+        off_N_K = expit(STEEPNESS * np.log(np.maximum(self.distance_N_K, SMALLEST) / tolerance))
+        return (self.weight_N_K * off_N_K).sum(axis=1)
+
+    def numbers(self, tolerance: float) -> np.ndarray:
+        """Return `PROBABILITY` (N, 6); lengths are logarithms relative to the tolerance."""
+        mean_N = (self.weight_N_K * self.distance_N_K).sum(axis=1)
+        lengths = (np.maximum(x_N, SMALLEST) for x_N in (mean_N, self.distance_N_K[:, 0], self.inlier_rmse_N))
+        apart_N = logit(np.clip(self.apart(tolerance), 1 - SUREST, SUREST))
+        constant_N = np.full(len(mean_N), np.log(tolerance))
+        relative = [np.log(length_N / tolerance) for length_N in lengths]
+        return np.column_stack([apart_N, *relative, self.fitness_N, constant_N])
+
+
+def distances(T_result: np.ndarray, enactments: Sequence[Enactment], surface: ModelSurface) -> np.ndarray:
+    """Return the error (K,) of a result (4, 4) under the hypotheses of its re-enactments."""
+    return surface.errors(T_result @ inverses(np.array([enactment.hypothesis.T for enactment in enactments])))
+
+
+@dataclass(frozen=True)
+class ResultJudge:
+    """Judges poses by what a re-enactment says of them."""
+
+    weights: np.ndarray  # (7,) of `PROBABILITY` in log odds, the constant last
+    error_weights: np.ndarray  # (5,) of `ERROR` in ln error (diameters), the constant last
+
+    @classmethod
+    def untrained(cls) -> ResultJudge:
+        """Return a judge that says the weight of hypotheses apart from the pose, and the mean distance to them."""
+        return cls(np.eye(7)[0], np.eye(5)[0])
+
+    @classmethod
+    def fit(cls, evidence: Evidence, error_N: np.ndarray) -> ResultJudge:
+        """Learn from poses with known errors (diameters), at all `TOLERANCES`."""
+        from sklearn.linear_model import Ridge
+
+        from gpca.explainers.classifiers import standardized_regression
+
+        numbers = np.concatenate([evidence.numbers(tolerance) for tolerance in TOLERANCES])
+        off = np.concatenate([error_N > tolerance for tolerance in TOLERANCES])
+        if off.all() or not off.any():
+            return cls.untrained()
+        scaler, regression = standardized_regression(REGULARIZATION).fit(numbers, off)
+        slopes = regression.coef_[0] / scaler.scale_
+        weights = np.append(slopes, regression.intercept_ - slopes @ scaler.mean_)
+        error = Ridge(alpha=1.0).fit(evidence.numbers(1.0)[:, 1:5], np.log(np.maximum(error_N, SMALLEST)))
+        return cls(weights, np.append(error.coef_, error.intercept_))
+
+    def probability(self, evidence: Evidence, tolerance: float) -> np.ndarray:
+        """Return the probabilities (N,) that the poses are off by more than the tolerance (diameters)."""
+        return expit(evidence.numbers(tolerance) @ self.weights[:-1] + self.weights[-1])
+
+    def error(self, evidence: Evidence) -> np.ndarray:
+        """Return the expected errors (N,), diameters."""
+        log_N = evidence.numbers(1.0)[:, 1:5] @ self.error_weights[:-1] + self.error_weights[-1]
+        return np.exp(log_N).clip(SMALLEST, LARGEST_ERROR)
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """What was calibrated at one tolerance on unseen families."""
+
+    tolerance: float  # diameters
+    threshold: float  # probability from which a result is called failed
+    guarantee: Guarantee | None = None  # sets of states and alarm
+
+    def state(self) -> dict[str, object]:
+        """Return plain values for :meth:`from_state`."""
+        guarantee = self.guarantee and self.guarantee.to_dict()
+        return {"tolerance": self.tolerance, "threshold": self.threshold, "guarantee": guarantee}
+
+    @classmethod
+    def from_state(cls, state: Mapping) -> Calibrated:
+        """Return what :meth:`state` holds."""
+        guarantee = None if state["guarantee"] is None else Guarantee.from_dict(state["guarantee"])
+        return cls(state["tolerance"], state["threshold"], guarantee)
+
+
+UNCALIBRATED = (Calibrated(DEFAULT_TOLERANCE, EVEN),)
+
+
+def calibrated_at(levels: Sequence[Calibrated], tolerance: float) -> Calibrated:
+    """Return what holds at a tolerance: between two levels the more cautious of both, beyond them no guarantee."""
+    lower = max((level for level in levels if level.tolerance <= tolerance), default=None, key=_tolerance)
+    upper = min((level for level in levels if level.tolerance >= tolerance), default=None, key=_tolerance)
+    if lower is None or upper is None:
+        nearest = lower or upper
+        assert nearest is not None
+        return Calibrated(tolerance, nearest.threshold)
+    both = lower.guarantee, upper.guarantee
+    cautious = both[0].more_cautious(both[1]) if both[0] and both[1] else None
+    return Calibrated(tolerance, max(lower.threshold, upper.threshold), cautious)
+
+
+def _tolerance(level: Calibrated) -> float:
+    return level.tolerance
