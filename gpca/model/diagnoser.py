@@ -103,7 +103,7 @@ class Diagnoser:
         inputs_1_F = self.classifier.normalized(features_F[None])
         judged = self.classifier.judge(inputs_1_F)
         result_1, level = self.judge.probability(evidence, tolerance), calibrated_at(self.levels, tolerance)
-        promised = level.guarantee and Guaranteed.of(level.guarantee, state_probabilities(judged, result_1))
+        scores_1_5, guarantee = state_probabilities(judged, result_1), level.guarantee
         diagnosis = Diagnosis(
             result=float(result_1[0]),
             threshold=level.threshold,
@@ -117,7 +117,7 @@ class Diagnoser:
             expected_error=float(self.judge.error(evidence)[0]),
             unlikeness=float(self.classifier.unlikeness(inputs_1_F)[0]),
             void=False,
-            guarantee=promised,
+            guarantee=Guaranteed.of(guarantee, scores_1_5) if guarantee else None,
             reenacted=reenacted,
         )
         return diagnosis, enactments

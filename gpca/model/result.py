@@ -27,6 +27,7 @@ EVEN = 0.5  # threshold of a judge without calibration
 # Rows of weights; the last number of each is the constant.
 PROBABILITY = ("apart", "mean_distance", "first_distance", "inlier_rmse", "fitness", "tolerance")
 ERROR = PROBABILITY[1:5]
+ROUNDED = 1 + 1e-9  # a tolerance may have been a length
 REGULARIZATION = 0.3  # scikit-learn's C, on standardized numbers
 
 
@@ -123,8 +124,8 @@ UNCALIBRATED = (Calibrated(DEFAULT_TOLERANCE, EVEN),)
 
 def calibrated_at(levels: Sequence[Calibrated], tolerance: float) -> Calibrated:
     """Return what holds at a tolerance: between two levels the more cautious of both, beyond them no guarantee."""
-    lower = max((level for level in levels if level.tolerance <= tolerance), default=None, key=_tolerance)
-    upper = min((level for level in levels if level.tolerance >= tolerance), default=None, key=_tolerance)
+    lower = max((level for level in levels if level.tolerance <= tolerance * ROUNDED), default=None, key=_tolerance)
+    upper = min((level for level in levels if level.tolerance >= tolerance / ROUNDED), default=None, key=_tolerance)
     if lower is None or upper is None:
         nearest = lower or upper
         assert nearest is not None
