@@ -57,7 +57,7 @@ class Diagnoser:
     """Classifiers on the features of a pair, and the settings with which these are measured."""
 
     classifier: PairClassifier  # of the start's failure and of the causes
-    start_threshold: float  # probability from which registrations from a start are said to fail
+    start_threshold: float  # probability from which a start is called bad
     judge: ResultJudge  # of the result
     levels: tuple[Calibrated, ...]  # its thresholds and guarantees at some tolerances
     points: int  # maximum number of points per cloud
@@ -305,7 +305,7 @@ def judged_unseen(training: TrainingSet, gpc: GPCSettings, *axes: object) -> tup
 def calibrated(
     training: TrainingSet, judged: Judgment, result_N: np.ndarray, tolerance: float, false_alarms: float
 ) -> Calibrated:
-    """Calibrate what is said of results at a tolerance, by judgments of unseen families.
+    """Calibrate threshold, alarm and sets of results at a tolerance, by judgments of unseen families.
 
     Sets of states hold for new families if there are enough families. The alarm's level is too high for their number:
     it is calibrated on single samples, and holds as far as registrations of a new family are like the others.

@@ -122,8 +122,8 @@ class Explainer:
         if diagnose:
             diagnoser = self.model.diagnoser.quick() if fast else self.model.diagnoser
             with _timed(seconds, "diagnosis"):
-                of_pair = clouds.source, clouds.target, T_found
-                diagnosis, enactments = diagnoser.diagnose(*of_pair, register, limit / clouds.frame.diameter)
+                aligned = clouds.source, clouds.target, T_found
+                diagnosis, enactments = diagnoser.diagnose(*aligned, register, limit / clouds.frame.diameter)
             diagnosis = replace(diagnosis.outside(clouds.frame, clouds.T_target_source_init), void=bool(voids))
             notes += [FAST] if fast else []
         with _timed(seconds, "embedding"):
