@@ -36,6 +36,7 @@ def add_explain_arguments(parser: ArgumentParser) -> None:
     add("--init", type=Path, help="text file with the 4×4 matrix T_target_source, the initial pose")
     add("--pose", type=Path, help="text file with T_target_source, which is judged as it is: nothing is registered")
     add("--save-pose", type=Path, metavar="FILE", help="write the pose that fits best, to start from with --init")
+    add("--tolerance", help="how far the pose may be off: 5mm, 2deg or a share of the diameter (default 3%%)")
     add("--unit", choices=METERS_PER_UNIT, default="m", help="unit of the files and the pose (default m)")
     add("--model", type=Path, help="model file (default: GPCA_MODEL, one in ./results/, or the package's)")
     add("--method", help="registration method, such as gicp (default: the model's ICP)")
@@ -95,6 +96,7 @@ def run_explain(options: Namespace) -> int:
     else:
         from gpca.model.explainer import Explainer
         from gpca.model.file import Model
+        from gpca.model.tolerance import DEFAULT
         from gpca.uncertainty.settings import MONTE_CARLO, UncertaintySettings
 
         model = Model.load(path)
@@ -109,6 +111,7 @@ def run_explain(options: Namespace) -> int:
             method=options.method,
             fast=options.fast,
             register=options.pose is None,
+            tolerance=options.tolerance or DEFAULT,
         )
     status = 0
     for name, source in zip(map(str, options.source), sources, strict=True):

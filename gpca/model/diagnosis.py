@@ -32,12 +32,17 @@ AXES = ("x", "y", "z")
 ALONG_DEG = 15.0  # largest angle between a rotation axis and an axis of the target's frame that may name it
 SMALL_TURN_DEG = 3.0  # smaller rotations are not mentioned
 CHECK = "check"  # action for a pair whose scores mean nothing
+RERUN = "rerun"  # action where the re-enactment knows a better pose
+REFINE = "refine"  # action for a given pose from which a registration would succeed
+SURE = 0.5  # probability of a pose from which to rerun from it
 ADVICE = {  # per branch of the policy
     NOTHING: "none",
     "reinitialize": "reinitialize ICP with a broader search",
     "new_view": "change the viewpoint",
     "denoise": "filter and check the sensor",
     CHECK: "check what was given",
+    RERUN: "rerun from pose 1",
+    REFINE: "register from this pose",
     QUEUE: "queue for labeling, so that the cause can be learned",
 }
 
@@ -188,6 +193,12 @@ class Reenacted:
             ),
         )
 
+    @property
+    def better(self) -> FittingPose | None:
+        """The likeliest pose, if it is more likely than all others together and not the registration's result."""
+        first = self.poses[0]
+        return None if first.registered or first.probability < SURE else first
+
     def outside(self, frame: CanonicalFrame, T_target_source_init: np.ndarray) -> Reenacted:
         """Convert to the user's frame and unit of length, in which the initial pose is given."""
         poses, unit = [], frame.diameter
@@ -264,6 +275,8 @@ class Diagnosis:
         """Causes more likely than not, likeliest first; at least one if the state is failed, otherwise none."""
         if self.state != FAILED:
             return ()
+        if self.start < self.start_threshold:  # the causes are those of bad starts, and only this pose is bad
+            return ("pose",)
         first, *rest = sorted(self.causes, key=lambda cause: -self.causes[cause])
         return first, *(cause for cause in rest if self.causes[cause] >= LIKELY)
 

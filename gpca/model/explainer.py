@@ -23,7 +23,7 @@ from gpca.classifier.scores import entropy
 from gpca.errors import InputError
 from gpca.model.clouds import OR_SCANS, Clouds, voids_of
 from gpca.model.diagnoser import QUICK_HYPOTHESES, QUICK_POINTS
-from gpca.model.diagnosis import CHECK
+from gpca.model.diagnosis import CHECK, REFINE, RERUN
 from gpca.model.explanation import GIVEN, Explanation, Motion, PoseSpread
 from gpca.model.file import Model
 from gpca.model.location import model_path
@@ -141,7 +141,12 @@ class Explainer:
                     f"the pair is {diagnosis.unlikeness:.1f} times as far from the registrations that the diagnosis "
                     "was trained on as 99 % of these are from one another"
                 )
-            if T_target_source_init is not None and method is None and self._fits_inverted(clouds, outcome):
+            if (
+                T_target_source_init is not None
+                and method is None
+                and register
+                and self._fits_inverted(clouds, outcome)
+            ):
                 warnings.append("the inverse of the initial pose fits far better: is it T_source_target?")
         moved = None
         if register and T_target_source_init is not None:
@@ -156,6 +161,12 @@ class Explainer:
             decision = self.policy.decide(scores_C, float(bald), concepts=self.model.gpc.classes)
         elif diagnosis.state == NOMINAL:
             decision = Decision(NOTHING, "", diagnosis.remark)
+        elif self.policy is self.model.policy and (better := diagnosis.reenacted.better):
+            decision = Decision(RERUN, "", f"it fits with probability {better.probability:.2f}; --save-pose writes it")
+        elif not register and diagnosis.start < diagnosis.start_threshold:
+            decision = Decision(
+                REFINE, "", f"registrations from such starts fail with probability {diagnosis.start:.2f}"
+            )
         else:
             causes = diagnosis.causes
             decision = self.policy.decide(np.array([*causes.values()]), diagnosis.bald, concepts=(*causes,))

@@ -125,17 +125,19 @@ class ExplainedRegistration:
         """Return the page for a notebook."""
         return page.framed(self.html())
 
-    def pose_rows(self) -> list[str]:
-        """Return `T_target_source` as text, row by row, so that it moves the points as the pose itself does."""
+    def pose_rows(self, T_target_source: np.ndarray) -> list[str]:
+        """Return a pose (4, 4) as text, row by row, so that it moves the points as the pose itself does."""
         if self.scene is None:
-            return as_rows(self.T_target_source, np.inf)
-        frame, shift_3 = self.scene.frame, self.T_target_source[:3, 3]
+            return as_rows(T_target_source, np.inf)
+        frame, shift_3 = self.scene.frame, T_target_source[:3, 3]
         farthest = sum(map(np.linalg.norm, (frame.center_3, shift_3))) + frame.diameter
-        return as_rows(self.T_target_source, float(farthest / frame.diameter))
+        return as_rows(T_target_source, float(farthest / frame.diameter))
 
     def _report(self, body: Sequence[str], registration: str, *end: str) -> str:
         warnings = [f"warning   {line}" for line in self.warnings]
-        pose = ["", f"T_target_source, in {self.unit}", *self.pose_rows()]
+        pose = ["", f"T_target_source, in {self.unit}", *self.pose_rows(self.T_target_source)]
+        if self.fitting_pose is not self.T_target_source:
+            pose += ["", "pose 1 as T_target_source, which --save-pose writes", *self.pose_rows(self.fitting_pose)]
         if self.moved:
             distance = page.length(self.moved.distance, self.unit)
             registration += f"\nmoved          {self.moved.rotation_deg:.3g}° and {distance} from the initial pose"
@@ -197,7 +199,9 @@ class Explanation(ExplainedRegistration):
         body += [
             page.counterfactuals(scene, self.unit) if scene else "",
             "" if self.unknown else page.as_in_the_paper(explained),
-            page.details(explained, {"training": self.learned_from} | dict(names or {}), self.pose_rows()),
+            page.details(
+                explained, {"training": self.learned_from} | dict(names or {}), self.pose_rows(self.T_target_source)
+            ),
         ]
         head = page.headline(explained) + page.warnings(self.warnings)
         return page.assembled("Registration explained", head, body, scene, self.unit)
@@ -274,7 +278,7 @@ class ScanExplanation(ExplainedRegistration):
             page.section("Overlap", f"<p>{escape(self._overlap())}.</p>"),
             page.poses(self.reenacted, "the source", self.unit),
             page.counterfactuals(scene, self.unit, SCANS_WITHOUT) if scene else "",
-            page.details(explained, inputs, self.pose_rows()),
+            page.details(explained, inputs, self.pose_rows(self.T_target_source)),
         ]
         head = f'<h1 class="{tone}">{title}</h1><p>{escape(doubt)}</p>{page.warnings(self.warnings)}'
         return page.assembled("Scans explained", head, body, scene, self.unit)

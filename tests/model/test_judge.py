@@ -7,7 +7,10 @@ import pytest
 
 import gpca
 from gpca.__main__ import main
+from gpca.causes.policy import NOTHING
+from gpca.causes.truth import FAILED
 from gpca.errors import InputError
+from gpca.model.diagnosis import RERUN
 from gpca.model.explanation import GIVEN
 from gpca.rigid import exp, transform
 
@@ -60,6 +63,29 @@ def test_the_command_judges_a_pose_and_saves_the_one_that_fits(pair, saved, tmp_
     np.testing.assert_array_equal(np.loadtxt("fits.txt"), expected)
     assert main([*words, "--init", "fits.txt"]) == 0
     assert json.loads(capsys.readouterr().out)["moved"]["distance"] >= 0
+
+
+def test_a_wrong_pose_is_called_so_and_the_answer_says_what_to_start_from(explainer, pair):
+    source, target = pair
+    T_right = explainer.explain(source, target).T_target_source
+    scale = float(np.linalg.norm(np.ptp(target, axis=0)))
+    wrong = explainer.judge(source, target, shifted(0.25 * scale) @ T_right)
+    assert wrong.diagnosis.state == FAILED
+    assert wrong.diagnosis.result > 0.9
+    better = wrong.diagnosis.reenacted.better
+    if better is not None:
+        assert wrong.action == RERUN
+        np.testing.assert_array_equal(wrong.fitting_pose, better.T_target_source)
+        assert "pose 1 as T_target_source, which --save-pose writes" in wrong.text()
+    else:
+        assert wrong.action != NOTHING
+
+
+def test_a_narrower_tolerance_makes_the_same_pose_less_likely_right(explainer, pair):
+    said = [explainer.explain(*pair, tolerance=text).diagnosis for text in ("1%", "3%", "10%")]
+    results = [diagnosis.result for diagnosis in said]
+    assert results == sorted(results, reverse=True)
+    assert [diagnosis.tolerance_share for diagnosis in said] == pytest.approx([0.01, 0.03, 0.1])
 
 
 @pytest.mark.parametrize("other", [["--init", "pose.txt"], ["--method", "point_to_point"]])
