@@ -289,6 +289,30 @@ def test_registration_ends_with_the_numbers_of_each_method(capsys):
     assert "6 pairs of up to 64 points" in out
 
 
+def test_results_of_unseen_families_are_judged_by_what_learned_and_was_calibrated_on_others():
+    from sklearn.metrics import roc_auc_score
+
+    from benchmarks import results
+    from gpca.model.diagnoser import TrainingSet
+
+    random, n = np.random.default_rng(0), 400
+    error_N = np.exp(random.uniform(np.log(0.003), np.log(0.4), size=n))
+    samples = TrainingSet(
+        *(np.zeros((n, 1)), np.full(n, "pose"), np.full(n, "pose"), np.ones((n, 3), bool)),
+        shown_error_N=error_N, family_N=np.arange(n) % 8,
+        distance_N_K=(error_N * np.exp(0.1 * random.normal(size=n)))[:, None],
+        weight_N_K=np.ones((n, 1)), inlier_rmse_N=random.random(n), fitness_N=random.random(n),
+    )  # fmt: skip
+    judged = results.judge_unseen(samples, 0.03)
+    found = results.measured(samples, judged, 0.03, np.arange(n), "")
+    assert found["auroc"] > 0.98
+    assert found["false_alarms"] < 0.08
+    assert (found["good"], found["families"]) == ((error_N <= 0.03).sum(), 8)
+    score_N, weights_2_N = np.round(random.random(n), 1), random.integers(0, 3, size=(2, n))
+    expected = [roc_auc_score(error_N > 0.03, score_N, sample_weight=weights_N) for weights_N in weights_2_N]
+    np.testing.assert_allclose(results.auroc(score_N, error_N > 0.03, weights_2_N), expected)
+
+
 def test_gpc_compares_equal_fits_and_ends_with_its_numbers(capsys):
     from benchmarks import gpc
 
