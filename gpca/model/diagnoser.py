@@ -261,11 +261,14 @@ def learn(
     judged, result_T_N = judged_unseen(training, gpc, *axes)
     clear_N, nominal_N = training.label_N != BORDERLINE, training.label_N == NOMINAL
     start_threshold = threshold_of(judged.failure_N[nominal_N], false_alarms)
-    levels = tuple(
+    calibrated_levels = (
         calibrated(training, judged, result_N, tolerance, false_alarms)
         for tolerance, result_N in zip(TOLERANCES, result_T_N, strict=True)
+        if (training.shown_error_N <= tolerance).any()
     )
-    default = TOLERANCES.index(DEFAULT_TOLERANCE)
+    levels = tuple(calibrated_levels) or UNCALIBRATED
+    at_default = calibrated_at(levels, DEFAULT_TOLERANCE)
+    off_N, result_N = training.shown_error_N > DEFAULT_TOLERANCE, result_T_N[TOLERANCES.index(DEFAULT_TOLERANCE)]
     diagnoser = Diagnoser(
         classifier=training.subset(clear_N).classifier(gpc, *axes),
         start_threshold=start_threshold,
@@ -276,7 +279,7 @@ def learn(
         moved=causes.moved,
         reenactment=reenactment,
         held_out=measured(training.subset(clear_N), judged.subset(clear_N), start_threshold)
-        | measured_results(training.shown_error_N > DEFAULT_TOLERANCE, result_T_N[default], levels[default].threshold),
+        | measured_results(off_N, result_N, at_default.threshold),
     )
     return diagnoser, judged.bald_N[clear_N & ~nominal_N]
 
@@ -351,7 +354,7 @@ def alarms(failed_N: np.ndarray, probability_N: np.ndarray, threshold: float) ->
     alarm_N, both = probability_N >= threshold, failed_N.any() and not failed_N.all()
     return {
         "auroc_failed": float(roc_auc_score(failed_N, probability_N)) if both else 0.5,
-        "false_alarms": float(alarm_N[~failed_N].mean()),
+        "false_alarms": float(alarm_N[~failed_N].mean()) if not failed_N.all() else 0.0,
         "missed": float((~alarm_N)[failed_N].mean()) if failed_N.any() else 0.0,
     }
 
