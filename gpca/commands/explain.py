@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import json
 import sys
-from argparse import ArgumentParser, Namespace
-from collections.abc import Callable
+from argparse import Action, ArgumentParser, Namespace
+from collections.abc import Callable, Iterable
 from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from gpca.commands.explain_inputs import Inputs, from_rows, from_words, inputs_in, target_reader
 from gpca.errors import InputError
 from gpca.io.files import require_outputs
 from gpca.jobs.arguments import length
-from gpca.model.clouds import read_points, read_pose, read_scan, require_format
 from gpca.model.location import model_path, require_model
 from gpca.objects.surface import METERS_PER_UNIT
 
@@ -23,21 +23,34 @@ if TYPE_CHECKING:
     from gpca.model.explainer import Explainer
     from gpca.model.explanation import Explanation, ScanExplanation
 
-UNKNOWN_STATUS = 3  # exit code; 1 is a failed check, 2 a user's fault
-FORMATS = "PLY, PCD, OBJ, STL, OFF, npy, npz, xyz, csv, KITTI's bin, LAS, E57"
+FAULTY_STATUS, UNKNOWN_STATUS = 2, 3  # exit codes; 1 is a failed check
+FORMATS = "PLY, PCD, OBJ, STL, OFF, VTK, glb, npy, npz, xyz, txt, asc, pts, csv, bin of KITTI or nuScenes, LAS, E57"
 FIGURE = "gpca.model.explanation_figure"  # by name: only this needs matplotlib
 OBJECT_OPTIONS = ("model", "fast", "uncertainty", "estimator", "queue", "png")  # they need a model of objects
+FOR_ONE = ("init", "pose", "save_pose", "html", "png")  # options that do not go with many pairs
+
+
+class _InsteadOfClouds(Action):
+    """An option that takes the place of all arguments without a name."""
+
+    def __call__(self, parser: ArgumentParser, namespace: Namespace, values: Any, option: str | None = None) -> None:
+        setattr(namespace, self.dest, values)
+        for action in parser._actions:
+            action.required = action.required and bool(action.option_strings)
 
 
 def add_explain_arguments(parser: ArgumentParser) -> None:
     add = parser.add_argument
     add("source", type=Path, nargs="+", help=f"observed cloud or mesh ({FORMATS})")
     add("target", type=Path, help="reference to which each source is aligned")
-    add("--init", type=Path, help="text file with the 4×4 matrix T_target_source, the initial pose")
-    add("--pose", type=Path, help="text file with T_target_source, which is judged as it is: nothing is registered")
+    pairs = "CSV with the columns source, target and perhaps init, unit and source_unit, in place of both"
+    add("--pairs", type=Path, metavar="FILE", action=_InsteadOfClouds, help=pairs)
+    add("--init", type=Path, help="file with the initial pose T_target_source: 4×4, 3×4 or TUM, text or npy")
+    add("--pose", type=Path, help="such a file with a pose that is judged as it is: nothing is registered")
     add("--save-pose", type=Path, metavar="FILE", help="write the pose that fits best, to start from with --init")
     add("--tolerance", help="how far the pose may be off: 5mm, 2deg or a share of the diameter (default 3%%)")
-    add("--unit", choices=METERS_PER_UNIT, default="m", help="unit of the files and the pose (default m)")
+    add("--unit", choices=METERS_PER_UNIT, default="m", help="unit of files, pose and results (default m)")
+    add("--source-unit", choices=METERS_PER_UNIT, help="unit of the sources, if another one")
     add("--model", type=Path, help="model file (default: GPCA_MODEL, one in ./results/, or the package's)")
     add("--method", help="registration method, such as gicp (default: the model's ICP)")
     add("--uncertainty", action="store_true", help="measure how much the pose varies over other ICP starts")
@@ -51,28 +64,26 @@ def add_explain_arguments(parser: ArgumentParser) -> None:
     add("--voxel", type=length, help="edge length of voxels for scans (default: from the point spacing)")
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--json", action="store_true", help="print one JSON object")
-    form.add_argument("--json-lines", action="store_true", help="print one line of JSON per source")
+    form.add_argument("--json-lines", action="store_true", help="print one line of JSON per source or pair")
 
 
 def run_explain(options: Namespace) -> int:
     """Read all files, then explain and print one source after the other; everything but results goes to stderr.
 
-    Files are read before heavy libraries are loaded, so that most mistakes are reported at once. Returns
-    `UNKNOWN_STATUS` if one of the explanations means nothing, otherwise 0.
+    Files, except for those of a CSV, are read before heavy libraries are loaded, so that most mistakes are reported at
+    once. Returns 2 if a row of the CSV has a fault, else `UNKNOWN_STATUS` if one of the explanations means nothing,
+    otherwise 0.
     """
     _require_options(options)
     path = None if options.scans else model_path(options.model)
     if path is not None:
         require_model(path)
-    for cloud in (*options.source, options.target):
-        require_format(cloud)
-    given = options.pose or options.init
-    T_init = read_pose(given) if given else None
-    if options.scans:
-        *sources, target = map(read_scan, (*options.source, options.target))
-    else:
-        *others, (target, frame) = (read_points(path, options.unit) for path in (*options.source, options.target))
-        sources = [points for points, _ in others]
+    rows = from_rows(options) if options.pairs else []
+    inputs = [] if options.pairs else from_words(options)
+    for each in inputs:
+        each.require_formats()
+    read_target = target_reader(options.scans)
+    given = [(each, each.read(read_target)) for each in inputs]
     # Unknown methods and estimators are reported here, so that no message blames a file for them.
     if options.method is not None:
         from gpca.alignment.methods.registry import make_method
@@ -88,7 +99,7 @@ def run_explain(options: Namespace) -> int:
     from gpca.model.explanation import LEARNED, Explanation
 
     explain: Callable[..., Explanation | ScanExplanation]
-    learned, names, extra = LEARNED, {"target": str(options.target)}, {}
+    learned, names, extra = LEARNED, dict[str, str](), dict[str, str]()
     if path is None:
         from gpca.model.scan_explainer import explain_scans
 
@@ -105,7 +116,6 @@ def run_explain(options: Namespace) -> int:
         extra["trained_on"] = f"{model.title} (procedural stand-in)" if model.stand_in else model.title
         explain = partial(
             explainer.explain,
-            frame=frame,
             uncertainty=UncertaintySettings() if options.uncertainty or options.estimator else None,
             estimator=options.estimator or MONTE_CARLO,
             method=options.method,
@@ -113,22 +123,50 @@ def run_explain(options: Namespace) -> int:
             register=options.pose is None,
             tolerance=options.tolerance or DEFAULT,
         )
-    status = 0
-    for name, source in zip(map(str, options.source), sources, strict=True):
+    statuses = {0}
+
+    def explain_one(each: Inputs, arguments: dict[str, Any]) -> None:
         try:
-            explanation = explain(source, target, T_target_source_init=T_init, unit=options.unit)
+            explanation = explain(**arguments)
         except InputError as fault:
-            raise InputError(name, str(fault)) from fault
-        _write(options, explanation, {"source": name, **names}, extra)
+            raise InputError(each.source, str(fault)) from fault
+        _write(options, explanation, {"source": str(each.source), "target": str(each.target), **names}, extra)
         if isinstance(explanation, Explanation):
-            status = UNKNOWN_STATUS if explanation.unknown else status
-            _queue(options.queue, explainer, explanation, f"{name} to {options.target}")
+            statuses.add(UNKNOWN_STATUS if explanation.unknown else 0)
+            _queue(options.queue, explainer, explanation, f"{each.source} to {each.target}")
+
+    for each, arguments in given:
+        explain_one(each, arguments)
+    for place, row in _with_progress(rows):
+        try:
+            each = inputs_in(row, options)
+            explain_one(each, each.read(read_target))
+        except InputError as fault:  # the other rows are explained
+            print(f"gpca explain: {place}: {fault}", file=sys.stderr)
+            statuses.add(FAULTY_STATUS)
     print(learned, file=sys.stderr)
-    return status
+    return FAULTY_STATUS if FAULTY_STATUS in statuses else max(statuses)
+
+
+def _with_progress(rows: list[tuple[str, dict[str, str]]]) -> Iterable[tuple[str, dict[str, str]]]:
+    """Show how many pairs are explained, and when all will be."""
+    if not rows:
+        return ()
+    from gpca.process.progress import progress
+
+    return progress(rows, "explaining", unit=" pairs")
 
 
 def _require_options(options: Namespace) -> None:
     """Reject options that exclude one another, and outputs that cannot be written."""
+    if options.pairs:
+        if options.source or not options.json_lines:
+            fault = "has sources and targets of its own" if options.source else "prints one line for each pair"
+            raise InputError("--pairs", fault, "leave out the others" if options.source else "add --json-lines")
+        options.source = []
+        for name in FOR_ONE:
+            if getattr(options, name):
+                raise InputError(f"--{name.replace('_', '-')}", "is not for --pairs", "leave it out")
     if len(options.source) > 1 and not options.json_lines:
         raise InputError("explain", f"{len(options.source)} sources need one line each", "add --json-lines")
     for name in OBJECT_OPTIONS if options.scans else ("voxel",):
@@ -144,7 +182,7 @@ def _require_options(options: Namespace) -> None:
             raise InputError("--pose", f"is judged as it is, without --{name}", "leave one of them out")
     if options.png and find_spec("matplotlib") is None:
         raise InputError("--png", "needs the package matplotlib, which is not installed", "pip install matplotlib")
-    read = [*options.source, options.target, options.init, options.pose, options.model]
+    read = [*options.source, options.target, options.init, options.pose, options.model, options.pairs]
     outputs = [path for path in (options.html, options.png, options.queue, options.save_pose) if path]
     require_outputs(outputs, [path for path in read if path])
 
@@ -156,7 +194,7 @@ def _write(
     as_json = options.json or options.json_lines
     # Text contains its warnings.
     warnings = [f"warning: {line}" for line in explanation.warnings] if as_json else []
-    for line in (*explanation.notes, *warnings):
+    for line in (*explanation.notes, *warnings) if not options.pairs else ():
         print(line if len(options.source) == 1 else f"{names['source']}: {line}", file=sys.stderr)
     if as_json:
         print(json.dumps(explanation.as_dict() | names | extra), flush=options.json_lines)

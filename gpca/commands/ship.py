@@ -20,7 +20,8 @@ from gpca.io.files import require_outputs, whole_file
 from gpca.io.structured_text import load_own_yaml, read_json
 from gpca.jobs.provenance import record_path
 from gpca.model.file import VERSION, Model
-from gpca.objects.canonical import LARGEST_DIAMETER_M, SMALLEST_DIAMETER_M, ObjectClouds
+from gpca.objects.canonical import ObjectClouds
+from gpca.objects.sizes import LARGEST_DIAMETER_M, SMALLEST_DIAMETER_M
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.sheet import where
 

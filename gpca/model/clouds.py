@@ -6,6 +6,7 @@ void: then its scores mean nothing, and the user should check the input.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from gpca.alignment.icp import ICPSettings
-from gpca.errors import InputError
+from gpca.errors import InputError, refusing
 from gpca.io.files import require_file
 from gpca.numerals import decimal
 from gpca.objects import mesh_folder, point_files
@@ -26,8 +27,9 @@ from gpca.objects.canonical import (
     require_cloud_points,
     thin,
 )
-from gpca.objects.surface import AS_ARGUMENT, AS_OPTION, as_points
-from gpca.rigid import require_rigid, transform
+from gpca.objects.sizes import IN_PYTHON, extent, require_sizes
+from gpca.objects.surface import as_points, in_unit, measured
+from gpca.rigid import require_rigid, rigid_motion, transform
 from gpca.seeds import generator
 
 if TYPE_CHECKING:
@@ -35,11 +37,12 @@ if TYPE_CHECKING:
 
 SAMPLED_POINTS = 16384  # points sampled on a mesh, as on the training objects
 LARGEST_POSE_BYTES = 10**5  # 16 numbers in any notation
+POSES = (
+    "give 4×4 or 3×4 numbers of T_target_source, row by row, or one line of TUM, [time] tx ty tz qx qy qz qw, as text "
+    "or npy"
+)
 SUFFIXES = (*mesh_folder.SUFFIXES, ".pcd", *point_files.TABLE_READERS, *point_files.PACKAGES)
-# Remedies for a wrong size: scans of places have no limits of size.
-OR_SCANS_OPTION = f"{AS_OPTION} (scans of places: --scans)"
-OR_SCANS = f"{AS_ARGUMENT} (scans of places: gpca.explain_scans)"
-LARGEST_RATIO = 8.0  # between the extents of source and target; a wrong unit gives 10 or more
+UNIT_QUATERNION = 1e-3  # largest error of its length
 FARTHEST_START = 10.0  # largest distance from the target's center to the source, in diameters of the target
 MEASURES = ("size", "depth", "closure")
 SHARE = 0.99  # share of the training samples within the range of each measure
@@ -61,63 +64,76 @@ def require_format(path: Path) -> None:
         raise InputError(path, "has an unsupported format", f"give one of {', '.join(SUFFIXES)}")
 
 
-def read_points(path: Path, unit: str) -> tuple[np.ndarray, CanonicalFrame]:
-    """Read a cloud, or sample a mesh: points (N, 3) in the file's unit, and their canonical frame.
+def read_points(path: Path) -> np.ndarray:
+    """Read a cloud of any size, or sample a mesh: points (N, 3) in the file's unit, with rows without a measurement.
 
     Raises InputError for a file that is missing, unreadable or of another format, a missing package, too few points,
-    NaN, a mesh without area, or a diameter out of range.
+    or a mesh with NaN or without area.
     """
-    scale = mesh_folder.meters_per(unit)
-    require_format(path)
-    if path.suffix.lower() in mesh_folder.SUFFIXES:
-        surface = mesh_folder.read_surface(path, scale)
-        if surface.faces is not None:
-            points_m, _, diameter_m = canonical_cloud(surface, "mesh", SAMPLED_POINTS, OR_SCANS_OPTION)
-            frame = CanonicalFrame(bounding_center(surface) / scale, diameter_m / scale)
-            return points_m.astype(np.float64) / scale + frame.center_3, frame
-        points = surface.vertices_m / scale
-    else:
-        points = _cloud(path)
-    return points, CanonicalFrame.of(points, unit, path, OR_SCANS_OPTION)
+    return _read(path)[0]
 
 
-def read_scan(path: Path) -> np.ndarray:
-    """Read a scan of any extent, or sample a mesh: points (N, 3) in the file's unit."""
+def read_target(path: Path) -> tuple[np.ndarray, CanonicalFrame]:
+    """Read as :func:`read_points` does, and return the canonical frame, too."""
+    points, frame = _read(path)
+    return points, frame or CanonicalFrame.of(measured(points, path), None, path)
+
+
+def _read(path: Path) -> tuple[np.ndarray, CanonicalFrame | None]:
     require_format(path)
-    if path.suffix.lower() not in mesh_folder.SUFFIXES:
-        points = _cloud(path)
+    suffix, frame = path.suffix.lower(), None
+    if suffix == ".pcd":
+        points = point_files.parse_pcd(path.read_bytes(), path)
+    elif suffix not in mesh_folder.SUFFIXES:
+        points = (point_files.read_table if suffix in point_files.TABLE_READERS else point_files.read_scanner_file)(
+            path
+        )
     else:
         surface = mesh_folder.read_surface(path, 1.0)
         points = surface.vertices_m
         if surface.faces is not None:  # sampled at unit extent, because sampling limits the size of meshes
-            extent = float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
-            surface = replace(surface, vertices_m=points / extent)
-            drawn, _, _ = canonical_cloud(surface, "mesh", SAMPLED_POINTS)
-            points = extent * (drawn.astype(np.float64) + bounding_center(surface))
-    require_cloud_points(points, path)
-    return points
-
-
-def _cloud(path: Path) -> np.ndarray:
-    suffix = path.suffix.lower()
-    if suffix == ".pcd":
-        return point_files.parse_pcd(path.read_bytes(), path)
-    return (point_files.read_table if suffix in point_files.TABLE_READERS else point_files.read_scanner_file)(path)
+            size = extent(points) or 1.0
+            points, _, diameter = canonical_cloud(replace(surface, vertices_m=points / size), "mesh", SAMPLED_POINTS)
+            frame = CanonicalFrame(bounding_center(surface), size * diameter)
+            points = size * points.astype(np.float64) + frame.center_3
+    require_cloud_points(measured(points, path), path)
+    return points, frame
 
 
 def read_pose(path: Path) -> np.ndarray:
-    """Read a pose (4, 4) from a text file of 16 numbers, row by row."""
-    remedy = "give 4×4 numbers, row by row"
-    require_file(path, "no such file", remedy, LARGEST_POSE_BYTES)
-    try:
-        numbers = [decimal(word) for word in path.read_text(encoding="utf-8").replace(",", " ").split()]
-    except ValueError as fault:
-        raise InputError(path, f"contains something that is not a number: {fault}", remedy) from fault
-    if len(numbers) != 16:
-        raise InputError(path, f"contains {len(numbers)} numbers", remedy)
-    T_target_source = np.array(numbers).reshape(4, 4)
+    """Read a pose (4, 4) in one of the forms of `POSES`; text may have comments (#), commas and brackets."""
+    require_file(path, "no such file", POSES, LARGEST_POSE_BYTES)
+    if path.suffix.lower() == ".npy":
+        with refusing(path, "is not a readable .npy file ({})", POSES):
+            array = np.load(path, allow_pickle=False).astype(np.float64)
+        lengths, numbers = array.shape[-1:], array.ravel()
+    else:
+        lines = [re.sub(r"[\[\](),;]", " ", line.partition("#")[0]).split() for line in _text_of(path).splitlines()]
+        lengths = tuple({len(line) for line in lines if line})
+        try:
+            numbers = np.array([decimal(word) for line in lines for word in line])
+        except ValueError as fault:
+            raise InputError(path, f"contains something that is not a number: {fault}", POSES) from fault
+    T_target_source = np.eye(4)
+    if len(numbers) in (12, 16) and not {7, 8} & {*lengths}:
+        T_target_source[: len(numbers) // 4] = numbers.reshape(-1, 4)
+    elif lengths == (len(numbers),) and len(numbers) in (7, 8):
+        *shift_3, x, y, z, w = numbers[-7:]
+        if not abs(np.linalg.norm((x, y, z, w)) - 1) < UNIT_QUATERNION:
+            raise InputError(path, "its last four numbers, qx qy qz qw, are no unit quaternion", POSES)
+        from scipy.spatial.transform import Rotation
+
+        T_target_source = rigid_motion(Rotation.from_quat((x, y, z, w)).as_matrix(), shift_3)
+    else:
+        rows = f" in lines of {' or '.join(map(str, sorted(lengths)))}" if len(numbers) in (12, 14, 16) else ""
+        raise InputError(path, f"contains {len(numbers)} numbers{rows}", POSES)
     require_rigid(T_target_source, path)
     return T_target_source
+
+
+def _text_of(path: Path) -> str:
+    with refusing(path, "is no text ({})", POSES):
+        return path.read_text(encoding="utf-8")
 
 
 @dataclass(frozen=True)
@@ -142,15 +158,19 @@ class Clouds:
         cloud_points: int,
         settings: ICPSettings,
         notes: list[str],
+        source_unit: str | None = None,
     ) -> Clouds:
         """Check a user's clouds and bring them into the target's frame; see :meth:`gpca.Explainer.explain`."""
         from gpca.alignment.batched_icp import BatchedICP
 
-        source, target = as_points(source_points, "source"), as_points(target_points, "target")
+        source, target = as_points(source_points, "source", notes), as_points(target_points, "target", notes)
         T_init = np.eye(4) if T_target_source_init is None else np.array(T_target_source_init, np.float64)
         require_rigid(T_init, "initial pose")
         require_cloud_points(source, "source")
-        frame = frame or CanonicalFrame.of(target, unit, say=OR_SCANS)
+        frame = frame or CanonicalFrame.of(target, None)
+        units = source_unit or unit, unit
+        require_sizes(("source", "target"), (extent(source), extent(target)), frame.diameter, units, IN_PYTHON)
+        source = in_unit(source, source_unit, unit)
         target = frame.coordinates(_thinned(target, cloud_points, "target", notes))
         seen = _thinned(source, cloud_points, "source", notes)
         source = frame.coordinates(transform(T_init, seen))
@@ -158,11 +178,6 @@ class Clouds:
         if T_target_source_init is not None and distance > FARTHEST_START:
             fault = f"puts the source {distance:.3g} diameters of the target away from it"
             raise InputError("initial pose", fault, f"give T_target_source, with its translation in {unit}")
-        extents = [float(np.linalg.norm(np.ptp(cloud, axis=0))) for cloud in (source, target)]
-        ratio = extents[0] / extents[1]
-        if not 1 / LARGEST_RATIO <= ratio <= LARGEST_RATIO:
-            remedy = "give both in the same unit, without points far from the object"
-            raise InputError("source", f"is {ratio:.3g} times as large as the target", remedy)
         normals = None if settings.method == "point_to_point" else normals_towards_camera(target)
         return cls(seen, T_init, frame, source, target, BatchedICP(target, settings, normals))
 

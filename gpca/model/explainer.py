@@ -21,7 +21,7 @@ from gpca.causes.policy import NOTHING, Decision, RecoveryPolicy
 from gpca.causes.truth import NOMINAL
 from gpca.classifier.scores import entropy
 from gpca.errors import InputError
-from gpca.model.clouds import OR_SCANS, Clouds, voids_of
+from gpca.model.clouds import Clouds, voids_of
 from gpca.model.diagnoser import QUICK_HYPOTHESES, QUICK_POINTS
 from gpca.model.diagnosis import CHECK, REFINE, RERUN
 from gpca.model.explanation import GIVEN, Explanation, Motion, PoseSpread
@@ -80,6 +80,7 @@ class Explainer:
         fast: bool = False,
         register: bool = True,
         tolerance: Tolerance | str = DEFAULT_TOLERANCE,
+        source_unit: str | None = None,
     ) -> Explanation:
         """Register the source to the target and explain the result. The same clouds give the same numbers.
 
@@ -87,7 +88,7 @@ class Explainer:
             source_points, target_points: (N, 3) observed cloud and reference to which it is aligned: arrays or Open3D
                 clouds.
             T_target_source_init: (4, 4) initial pose; by default, the identity.
-            unit: unit of points and pose: ``m``, ``cm`` or ``mm``.
+            unit: unit of points, pose and results: ``m``, ``cm`` or ``mm``.
             frame: canonical frame of the target; by default, computed from its points.
             uncertainty: spread of the starts for the uncertainty of the pose; None skips it.
             diagnose: whether to diagnose the registration. GP-CA alone takes a fifth of the time,
@@ -98,19 +99,20 @@ class Explainer:
                 why it failed.
             tolerance: how far the pose may be off: a length, an angle or a share of the diameter, such as ``5mm``.
             register: whether to register; otherwise the initial pose itself is explained, as :meth:`judge` does.
+            source_unit: unit of the source's points, if another one; they are converted first.
             fast: whether to re-enact fewer points and poses, without a guarantee; it saves a tenth to a fifth of the
                 time.
 
         Raises:
-            InputError: too few points, NaN, implausible unit, very different sizes, an initial pose that is not rigid,
-                unknown method or estimator, missing package, or an estimator that has to be trained.
+            InputError: too few points with a measurement, implausible units, very different sizes, an initial pose that
+                is not rigid, unknown method or estimator, missing package, or an estimator that has to be trained.
         """
         started = perf_counter()
         seconds: dict[str, float] = {}
         notes: list[str] = []
         with _timed(seconds, "preparation"):
             inputs = (source_points, target_points, T_target_source_init, unit, frame)
-            clouds = Clouds.prepared(*inputs, self.model.cloud_points, self.model.icp, notes)
+            clouds = Clouds.prepared(*inputs, self.model.cloud_points, self.model.icp, notes, source_unit)
             allowed = tolerance if isinstance(tolerance, Tolerance) else Tolerance.parse(tolerance)
             limit = allowed.length(clouds.target, clouds.frame.diameter, unit)
         with _timed(seconds, "icp"):
@@ -214,6 +216,7 @@ class Explainer:
         method: str | None = None,
         estimator: str = MONTE_CARLO,
         fast: bool = False,
+        source_unit: str | None = None,
     ) -> Iterator[Explanation]:
         """Yield the explanation of each pair, as :meth:`explain` returns it but without the data of a page.
 
@@ -221,7 +224,7 @@ class Explainer:
 
         Args:
             pairs: source, target, and optionally the initial pose.
-            unit, uncertainty, diagnose, method, estimator, fast: see :meth:`explain`.
+            unit, uncertainty, diagnose, method, estimator, fast, source_unit: see :meth:`explain`.
 
         Raises:
             InputError: see :meth:`explain`; the message names the number of the pair, from 0.
@@ -232,9 +235,11 @@ class Explainer:
             try:
                 if frame is None or target_points is not last_target:
                     last_target = target_points
-                    frame = CanonicalFrame.of(as_points(target_points, "target"), unit, say=OR_SCANS)
+                    frame = CanonicalFrame.of(as_points(target_points, "target"), None)
                 T_init = init[0] if init else None
-                explanation = self.explain(source_points, target_points, T_init, unit, frame, *options)
+                explanation = self.explain(
+                    source_points, target_points, T_init, unit, frame, *options, source_unit=source_unit
+                )
                 yield replace(explanation, scene=None)
             except InputError as fault:
                 raise InputError(f"pair {number}", str(fault)) from fault

@@ -28,7 +28,7 @@ from gpca.model.scan_registration import Scans, in_voxels, voxel_size
 from gpca.model.scene import Scene
 from gpca.numerals import in_decimals
 from gpca.objects.canonical import CanonicalFrame, diameter, require_cloud_points
-from gpca.objects.surface import as_points, meters_per
+from gpca.objects.surface import as_points, in_unit, meters_per
 from gpca.pairs.distances import ObservedPair
 from gpca.reenactment.enactment import Enactment
 from gpca.reenactment.hypotheses import INDEPENDENT, weights_of
@@ -57,26 +57,30 @@ def explain_scans(
     unit: str = "m",
     voxel: float | None = None,
     method: str | None = None,
+    source_unit: str | None = None,
 ) -> ScanExplanation:
     """Register a scan to a scan, and judge whether that may have failed. The same clouds give the same numbers.
 
     Args:
         source_points, target_points: (N, 3) arrays, or Open3D clouds, of any extent.
         T_target_source_init: (4, 4) initial pose; by default, the identity.
-        unit: unit of points, pose and voxel: ``m``, ``cm`` or ``mm``.
+        unit: unit of points, pose, voxel and results: ``m``, ``cm`` or ``mm``.
         voxel: edge length of the voxels to which both are thinned; by default, chosen from the point spacing.
         method: registration method (docs/registration.md); by default, point-to-plane ICP, coarse to fine.
+        source_unit: unit of the source's points, if another one; they are converted first.
 
     Raises:
-        InputError: too few points, NaN, points on one line, an initial pose that is not rigid, voxels that leave too
-            few points, unknown method or missing package.
+        InputError: too few points with a measurement, points on one line, an initial pose that is not rigid, voxels
+            that leave too few points, unknown method or missing package.
     """
     started = perf_counter()
     meters_per(unit)
     T_init = np.eye(4) if T_target_source_init is None else np.array(T_target_source_init, np.float64)
     require_rigid(T_init, "initial pose")
-    clouds = {"source": as_points(source_points, "source"), "target": as_points(target_points, "target")}
-    scans, frame, notes = _prepared(clouds, T_init, unit, voxel)
+    notes: list[str] = []
+    source = in_unit(as_points(source_points, "source", notes), source_unit, unit)
+    clouds = {"source": source, "target": as_points(target_points, "target", notes)}
+    scans, frame = _prepared(clouds, T_init, unit, voxel, notes)
     outcome = scans.registered() if method is None else scans.registered_by(method)
     if outcome.failure:
         notes.append(f"{method} failed: {outcome.failure}")
@@ -116,16 +120,15 @@ def explain_scans(
 
 
 def _prepared(
-    clouds: dict[str, np.ndarray], T_init: np.ndarray, unit: str, voxel: float | None
-) -> tuple[Scans, CanonicalFrame, list[str]]:
-    """Thin both scans to voxels; return them with the frame of the target and notes."""
+    clouds: dict[str, np.ndarray], T_init: np.ndarray, unit: str, voxel: float | None, notes: list[str]
+) -> tuple[Scans, CanonicalFrame]:
+    """Thin both scans to voxels; return them with the frame of the target."""
     for name, points in clouds.items():
         require_cloud_points(points, name)
     if voxel is None:
         voxel = voxel_size(clouds, unit)
     if not 0 < voxel < np.inf:
         raise InputError("voxel", f"{voxel:g} is no length", "give a positive one")
-    notes = []
     for name, points in clouds.items():
         thinned = clouds[name] = in_voxels(points, voxel, name, unit)
         edge = f"{in_decimals(voxel, 3)} {unit}"
@@ -137,7 +140,7 @@ def _prepared(
     low, high = np.quantile(clouds["target"], (OUTSIDE, 1 - OUTSIDE), axis=0)
     frame = CanonicalFrame((low + high) / 2, float(np.sqrt(np.square(high - low).sum())))
     source = frame.coordinates(transform(T_init, clouds["source"]))
-    return Scans(source, frame.coordinates(clouds["target"]), voxel / frame.diameter), frame, notes
+    return Scans(source, frame.coordinates(clouds["target"]), voxel / frame.diameter), frame
 
 
 def _enacted(scans: Scans, pair: ObservedPair) -> list[Enactment]:

@@ -27,12 +27,12 @@ from gpca.errors import InputError
 from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.io.csv_file import read_csv
 from gpca.io.files import is_name
-from gpca.objects.surface import IN_CONFIG, Surface, instance_of, meters_per
+from gpca.objects.sizes import LARGEST_DIAMETER_M, SMALLEST_DIAMETER_M, require_size
+from gpca.objects.surface import Surface, instance_of, meters_per
 from gpca.process.environment import open3d_cloud, require_open3d
 from gpca.seeds import generator
 
 FEWEST_CLOUD_POINTS = 64
-SMALLEST_DIAMETER_M, LARGEST_DIAMETER_M = 1e-3, 10.0
 NORMAL_NEIGHBORS = 30
 MEASURED_POINTS = 10_000  # at most, that determine the frame: all points of a cloud may lie on its hull
 # A cloud spans nearly its object's diameter. Few points miss some of it, but never nine tenths.
@@ -84,13 +84,11 @@ def diameter(points: np.ndarray, subject: object) -> float:
     return float(max(cdist(block, hull).max() for block in blocks))
 
 
-def canonical_cloud(
-    surface: Surface, source: str, n_points: int = 16384, say: str = IN_CONFIG
-) -> tuple[np.ndarray, np.ndarray, float]:
+def canonical_cloud(surface: Surface, source: str, n_points: int = 16384) -> tuple[np.ndarray, np.ndarray, float]:
     """Return points and unit normals (P, 3) float32 of a surface, centered on its bounding box, and its diameter (m).
 
     A mesh gives `n_points` area-uniform samples. A cloud keeps all its points, in random order; missing normals are
-    estimated and turned toward the camera at the origin. `say` is how the user sets the unit.
+    estimated and turned toward the camera at the origin.
     """
     subject = f"{source}: object '{surface.name}'"
     vertices_m = np.asarray(surface.vertices_m, dtype=np.float64)
@@ -102,7 +100,7 @@ def canonical_cloud(
                 subject, f"the cloud has {len(vertices_m)} point(s)", f"give {FEWEST_CLOUD_POINTS} or more"
             )
         diameter_m = diameter(vertices_m, subject)
-        require_size(diameter_m, subject, say)
+        require_size(diameter_m, subject)
         order = random.permutation(len(vertices_m))
         normals = normals_towards_camera(surface.vertices_m) if surface.normals is None else surface.normals
         points_m, normals = surface.vertices_m[order], normals[order]
@@ -112,7 +110,7 @@ def canonical_cloud(
         if not np.linalg.norm(_area_vectors(vertices_m, surface.faces), axis=1).sum() > 0:
             raise InputError(subject, "the mesh has no area", "export it again with its faces")
         diameter_m = diameter(_used_vertices(surface), subject)
-        require_size(diameter_m, subject, say)
+        require_size(diameter_m, subject)
         points_m, face = sample_surface(vertices_m, surface.faces, n_points, random)
         normals = _area_vectors(surface.vertices_m, surface.faces[face])
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
@@ -130,15 +128,6 @@ def _used_vertices(surface: Surface) -> np.ndarray:
     vertices_m = np.asarray(surface.vertices_m, dtype=np.float64)
     # Vertices that no face uses are no surface.
     return vertices_m if surface.faces is None else vertices_m[np.unique(surface.faces)]
-
-
-def require_size(diameter_m: float, subject: object, say: str = IN_CONFIG) -> None:
-    """Raise an InputError unless a diameter is 1 mm to 10 m; `say` is how the user sets the unit."""
-    if SMALLEST_DIAMETER_M <= diameter_m <= LARGEST_DIAMETER_M:
-        return
-    unit, short = ("millimeters", "mm") if diameter_m > LARGEST_DIAMETER_M else ("meters", "m")
-    fault = f"its diameter is {diameter_m:.4g} m, so the declared unit looks wrong"
-    raise InputError(subject, fault, f"is it in {unit}? {say.format(short)}")
 
 
 def sample_surface(
@@ -176,14 +165,13 @@ class CanonicalFrame:
     diameter: float
 
     @classmethod
-    def of(
-        cls, points: np.ndarray, unit: str = "m", subject: object = "target", say: str = IN_CONFIG
-    ) -> CanonicalFrame:
-        """Measure the points (N, 3) of a target; `subject` names it, and `say` is how the user sets the unit."""
+    def of(cls, points: np.ndarray, unit: str | None = "m", subject: object = "target") -> CanonicalFrame:
+        """Measure the points (N, 3) of a target, of any size without a unit; `subject` names it in messages."""
         require_cloud_points(points, subject)
         points = thin(points, MEASURED_POINTS, "frame")
         size = diameter(points, subject)
-        require_size(size * meters_per(unit), subject, say)
+        if unit is not None:
+            require_size(size * meters_per(unit), subject, unit)
         return cls((points.min(axis=0) + points.max(axis=0)) / 2, size)
 
     def coordinates(self, points: np.ndarray) -> np.ndarray:

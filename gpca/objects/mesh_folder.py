@@ -1,7 +1,8 @@
-"""Meshes and clouds in a folder: PLY, OBJ, STL, OFF; one file is one object."""
+"""Meshes and clouds in a folder: PLY, OBJ, STL, OFF, VTK, glb; one file is one object."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -9,11 +10,13 @@ import numpy as np
 
 from gpca.errors import InputError, refusing
 from gpca.io.files import require_file
+from gpca.objects import mesh_formats, scene_formats
 from gpca.objects.canonical import require_points
-from gpca.objects.mesh_formats import READERS
 from gpca.objects.surface import Surface, meters_per
 
+READERS = {**mesh_formats.READERS, **scene_formats.READERS}
 SUFFIXES = tuple(READERS)
+WITHOUT_FACES = (".ply", ".vtk", ".glb")
 
 
 def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
@@ -40,22 +43,27 @@ def files_in(folder: str | Path, patterns: Sequence[str] | None, suffixes: Seque
 
 
 def read_surface(path: Path, scale: float) -> Surface:
-    """Read one file, vertices times `scale`. Points without faces are a cloud, which only PLY may hold."""
+    """Read one file, vertices times `scale`. Points without faces are a cloud, in which depth may be missing (NaN).
+
+    CloudCompare writes zeros as the normals of a cloud that has none, so a cloud with such a normal is given none.
+    """
     remedy, suffix = "fetch or export it again", path.suffix.lower()
     require_file(path, "no such file", remedy)
     fault = f"is truncated or not a readable {path.suffix} file ({{}})"  # for which numpy raises errors of many kinds
     with refusing(path, fault, remedy), path.open("rb") as file, np.errstate(all="ignore"):  # overflows are found below
         vertices, faces, normals = READERS[suffix](file)
-    require_points(vertices, path)
     if len(faces):
+        require_points(vertices, path)
         if faces.min() < 0 or faces.max() >= len(vertices):
             raise InputError(path, "a face refers to a missing vertex", remedy)
         return Surface(path.stem, vertices * scale, faces)
-    if suffix != ".ply":
+    if suffix not in WITHOUT_FACES:
         raise InputError(path, "has no faces", f"{remedy}, or give the points as PLY")
+    require_points(vertices[np.isfinite(vertices).all(axis=1)], path)
     if normals is not None:
         lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-        if not (lengths > 0).all():
-            raise InputError(path, "a normal is zero or NaN", "export it again with its normals or without any")
-        normals = normals / lengths
+        bad = int((~(lengths > 0)).sum())
+        if bad:
+            print(f"{path}: {bad} of {len(normals)} normals are zero or NaN, so none of them is used", file=sys.stderr)
+        normals = None if bad else normals / lengths
     return Surface(path.stem, vertices * scale, None, normals)

@@ -88,7 +88,7 @@ def _read_ply(file: IO[bytes]) -> Shape:
         if element.name == "face":
             if element.corners is None:
                 raise ValueError("its faces have no list 'vertex_indices'")
-            faces = _triangles(columns["face"][element.corners])
+            faces = as_triangles(columns["face"][element.corners])
     return Shape(vertices, faces, normals)
 
 
@@ -96,7 +96,7 @@ def _ply_header(file: IO[bytes]) -> tuple[str, list[_Element]]:
     """Return the order of bytes, none for text, and the elements that have rows."""
     elements: dict[str, _Element] = {}
     form = b""
-    lines = _bounded_lines(file)
+    lines = bounded_lines(file)
     if next(lines, b"").strip() != b"ply":
         raise ValueError("it does not begin with 'ply'")
     properties: list[_Property] | None = None
@@ -104,7 +104,7 @@ def _ply_header(file: IO[bytes]) -> tuple[str, list[_Element]]:
         match line.split():
             case [b"end_header", *_]:
                 if form not in PLY_ORDERS:
-                    raise ValueError(f"its format {_shown(form)} is unknown")
+                    raise ValueError(f"its format {quoted(form)} is unknown")
                 return PLY_ORDERS[form], [element for element in elements.values() if element.rows]
             case [b"format", form, *_]:
                 pass
@@ -112,22 +112,22 @@ def _ply_header(file: IO[bytes]) -> tuple[str, list[_Element]]:
                 if (name := word.decode("ascii", "replace")) in elements:
                     raise ValueError(f"its header declares element {name} twice")
                 properties = []
-                elements[name] = _Element(name, _count(count), properties)
+                elements[name] = _Element(name, as_count(count), properties)
             case ([b"property", kind, name] | [b"property", b"list", _, kind, name]) as words if properties is not None:
                 if name in (before.name for before in properties):
-                    raise ValueError(f"its header declares property {_shown(name)} twice in one element")
+                    raise ValueError(f"its header declares property {quoted(name)} twice in one element")
                 for word in words[1:-1]:
                     if word not in (b"list", *PLY_KINDS):
-                        raise ValueError(f"its header contains the unknown type {_shown(word)}")
+                        raise ValueError(f"its header contains the unknown type {quoted(word)}")
                 length_kind = PLY_KINDS[words[2]] if len(words) == 5 else None
                 properties.append(_Property(name, PLY_KINDS[kind], length_kind))
             case [b"format" | b"element" | b"property", *_]:
-                raise ValueError(f"its header contains {_shown(line.strip())}")
+                raise ValueError(f"its header contains {quoted(line.strip())}")
     raise ValueError("its header has no end")
 
 
 def _ply_text(file: IO[bytes], elements: list[_Element]) -> dict[str, dict[bytes, Any]]:
-    rows = (row.split() for row in _lines(file) if row.strip())
+    rows = (row.split() for row in text_lines(file) if row.strip())
     data = {}
     for element in elements:
         corners, wanted = element.corners, (*AXES, *NORMALS, element.corners)
@@ -139,7 +139,7 @@ def _ply_text(file: IO[bytes], elements: list[_Element]) -> dict[str, dict[bytes
             for name, _, length_kind in element.properties:
                 start, length = place, 1
                 if length_kind and place < len(row):
-                    start, length = place + 1, _count(row[place])
+                    start, length = place + 1, as_count(row[place])
                 values, place = row[start : start + length], start + length
                 if name == corners:
                     if length < 3:
@@ -189,13 +189,13 @@ def _ply_binary(file: IO[bytes], order: str, elements: list[_Element]) -> dict[s
 
 
 def _read_off(file: IO[bytes]) -> Shape:
-    rows = (words for words in (line.split(b"#")[0].split() for line in _lines(file)) if words)
+    rows = (words for words in (line.split(b"#")[0].split() for line in text_lines(file)) if words)
     head = next(rows, [b""])
     if not head[0].startswith((b"OFF", b"COFF")):
         raise ValueError("it does not begin with 'OFF'")
     # The counts may stand in the line of the word OFF or COFF, even without a space.
     counts = [word for word in (head[0].lstrip(b"COF"), *head[1:]) if word] or next(rows, [])
-    vertices, faces = (_count(word) for word in counts[:2])
+    vertices, faces = (as_count(word) for word in counts[:2])
     points, polygons = [], []
     for i in range(vertices):
         if len(row := next(rows, [])) not in OFF_VERTEX_COLUMNS:
@@ -203,7 +203,7 @@ def _read_off(file: IO[bytes]) -> Shape:
         points.append([decimal(word.decode("utf-8", "replace")) for word in row][:3])
     for i in range(faces):
         row = next(rows, [b"0"])
-        corners = _count(row[0])
+        corners = as_count(row[0])
         whole = len(row) - 1 - corners in OFF_COLOR_COLUMNS and all(word.isdigit() for word in row[1 : 1 + corners])
         if 0 < corners < 3:
             raise ValueError(f"face {i + 1} of {faces} has {corners} corners")
@@ -212,7 +212,7 @@ def _read_off(file: IO[bytes]) -> Shape:
         polygons.append([int(word) for word in row[1 : 1 + corners]])
     if next(rows, None) is not None:
         raise ValueError("more rows than it declares")
-    return Shape(np.array(points).reshape(-1, 3), _triangles(polygons))
+    return Shape(np.array(points).reshape(-1, 3), as_triangles(polygons))
 
 
 def _read_obj(file: IO[bytes]) -> Shape:
@@ -220,7 +220,7 @@ def _read_obj(file: IO[bytes]) -> Shape:
     groups: dict[bytes, list] = {}  # faces of each material: numbers of vertex, texture and normal of their corners
     widths: dict[bytes, set[int]] = {}  # how many numbers its faces have
     material, relative_at, others, has_normals, before = b"", -1, False, False, b""
-    for number, line in enumerate(_lines(file), start=1):
+    for number, line in enumerate(text_lines(file), start=1):
         line = before + line.split(b"#")[0].rstrip()
         before = line[:-1] + b" " if line.endswith(b"\\") else b""  # it continues in the next line
         if before or not line.strip():
@@ -247,7 +247,7 @@ def _read_obj(file: IO[bytes]) -> Shape:
         raise InputError(file.name, "has no faces", "export it again, or give the points as PLY")
     # The materials stand in reverse, and a vertex is repeated for each of its textures and normals.
     corners_K_3 = [
-        _triangles(groups[name], by_length=len(widths[name]) == 1).reshape(-1, 3) for name in reversed(groups)
+        as_triangles(groups[name], by_length=len(widths[name]) == 1).reshape(-1, 3) for name in reversed(groups)
     ]
     for vertex_K in (corners[:, 0] for corners in corners_K_3):
         vertex_K += np.where(vertex_K < 0, len(rows), -1)
@@ -284,7 +284,7 @@ def _read_stl(file: IO[bytes]) -> Shape:
         raise ValueError("it neither begins with 'solid' nor has the length that its number of facets needs")
     file.seek(0)
     rows, place, keyword = [], 0, b"solid"  # within the facet, and of the line before
-    for number, line in enumerate(_lines(file), start=1):
+    for number, line in enumerate(text_lines(file), start=1):
         words = line.lower().split()
         if not words:
             continue
@@ -294,9 +294,9 @@ def _read_stl(file: IO[bytes]) -> Shape:
         keyword, wanted = STL_FACET[place]
         length = len(keyword.split())
         if (written := b" ".join(words[:length])) != keyword:
-            raise ValueError(f"line {number}: {_shown(written)} stands where {_shown(keyword)} should")
+            raise ValueError(f"line {number}: {quoted(written)} stands where {quoted(keyword)} should")
         if (numbers := len(words) - length) != wanted:
-            raise ValueError(f"line {number}: {_shown(keyword)} has {numbers} numbers")
+            raise ValueError(f"line {number}: {quoted(keyword)} has {numbers} numbers")
         if wanted and keyword == b"vertex":
             rows.append(b" ".join(words[1:]))
         place = (place + 1) % len(STL_FACET)
@@ -319,7 +319,7 @@ READERS: dict[str, Callable[[IO[bytes]], Shape]] = {  # ValueError for a file th
 }
 
 
-def _triangles(polygons: np.ndarray | list, by_length: bool = True) -> np.ndarray:
+def as_triangles(polygons: np.ndarray | list, by_length: bool = True) -> np.ndarray:
     """Return the triangles (F, 3, ...) of polygons: those of triangles, first and second halves of quads, then fans.
 
     Not `by_length`, they are in the order of the polygons.
@@ -348,26 +348,26 @@ def _numbers(rows: list[bytes], columns: int) -> np.ndarray:
     return table
 
 
-def _lines(file: IO[bytes]) -> Iterator[bytes]:
+def text_lines(file: IO[bytes]) -> Iterator[bytes]:
     """Yield the remaining lines of a text file; InputError where it has too much text to parse."""
     if (size := os.fstat(file.fileno()).st_size) > LARGEST_TEXT_BYTES:
         fault = f"has {size / 1e6:.0f} MB of text, more than the limit of {LARGEST_TEXT_BYTES / 1e6:.0f} MB"
         raise InputError(file.name, fault, "export it as binary PLY, or with fewer faces")
-    yield from _bounded_lines(file)
+    yield from bounded_lines(file)
 
 
-def _bounded_lines(file: IO[bytes]) -> Iterator[bytes]:
+def bounded_lines(file: IO[bytes]) -> Iterator[bytes]:
     while line := file.readline(LONGEST_LINE):
         if len(line) == LONGEST_LINE:
             raise ValueError(f"a line is longer than {LONGEST_LINE} bytes, so it is not text")
         yield line
 
 
-def _count(word: bytes) -> int:
+def as_count(word: bytes) -> int:
     if not word.isdigit():
-        raise ValueError(f"{_shown(word)} is not a count")
+        raise ValueError(f"{quoted(word)} is not a count")
     return int(word)
 
 
-def _shown(word: bytes) -> str:
+def quoted(word: bytes) -> str:
     return f"'{word[:40].decode('ascii', 'replace')}'"

@@ -1,4 +1,6 @@
-"""Point clouds in files: PCD (0.6, 0.7), npy, npz, xyz, csv, bin of KITTI, and LAS, LAZ, E57 by packages of their own.
+"""Point clouds in files: PCD (0.6, 0.7), NumPy's, text, bin of scanners, and LAS, LAZ, E57 by packages of their own.
+
+Rows without a measurement are kept as they are; :func:`gpca.objects.surface.measured` finds them.
 
 PCD: https://pointclouds.org/documentation/tutorials/pcd_file_format.html. Open3D's reader (0.19) fills gaps of a cut
 file or a short row with whatever the memory holds, and reads a double after bytes as 0.
@@ -10,6 +12,7 @@ files or in the dataset's tars, named <class>_<instance>_<sequence>_<frame>; in 
 from __future__ import annotations
 
 import io
+import re
 import struct
 import warnings
 import zipfile
@@ -35,16 +38,11 @@ AXES = ("x", "y", "z")
 
 
 def parse_pcd(content: bytes, subject: object) -> np.ndarray:
-    """Return the points (P, 3) float64 of a PCD file's content, in the file's unit; `subject` names it in messages.
-
-    An organized cloud (HEIGHT > 1) marks missing depth by NaN, which is left out; elsewhere NaN is a fault.
-    """
+    """Return the points (P, 3) float64 of a PCD file's content, in the file's unit; `subject` names it in messages."""
     try:
-        points = _parse_pcd(content)
+        return _parse_pcd(content)
     except (ValueError, KeyError, IndexError, TypeError, struct.error) as fault:
         raise InputError(subject, f"is not a readable PCD file ({fault})", "fetch or export it again") from fault
-    require_points(points, subject)
-    return points
 
 
 def _parse_pcd(content: bytes) -> np.ndarray:
@@ -104,8 +102,7 @@ def _parse_pcd(content: bytes) -> np.ndarray:
             points = np.column_stack([np.frombuffer(data, columns[i].base, count, int(starts[i])) for i in xyz])
         case encoding:
             raise ValueError(f"wrong header: unknown DATA {encoding}")
-    points = points.astype(np.float64)
-    return points[~np.isnan(points).any(axis=1)] if height > 1 else points
+    return points.astype(np.float64)
 
 
 def _lzf_decompress(data: bytes, size: int) -> bytearray:
@@ -131,9 +128,14 @@ def _lzf_decompress(data: bytes, size: int) -> bytearray:
 
 # What the array of points is called in an npz that holds others too, most usual first.
 NAMES = ("points", "xyz", "positions", "pos", "coords", "vertices", "pcd", "cloud", "data")
-KITTI_COLUMNS = 4  # x, y, z and the intensity, float32
 SEPARATORS = (",", ";", "\t")
-FARTHEST_KITTI = 1e4  # meters; no such scanner sees so far, so the file holds something else
+# Columns of float32 in a bin file: x, y, z and the intensity, as KITTI has them; nuScenes adds the number of the ring.
+BIN_COLUMNS = (4, 5)
+NUSCENES = ".pcd.bin"  # how names of nuScenes end
+FARTHEST_SCANNED = 1e4  # meters; no such scanner sees so far, so the file holds something else
+MOST_RINGS = 256
+# Read with too few or too many columns, each column holds values of all, so that their mean sizes are nearly equal.
+LEAST_CONTRAST = 1.5  # largest mean size of a column over the smallest
 COLUMNS_REMEDY = "export it as three columns x, y, z"
 
 
@@ -162,9 +164,8 @@ def _numpy_file(path: Path) -> np.ndarray:
         array = np.stack([np.asarray(array[axis], np.float64).ravel() for axis in AXES], axis=1)
     if array.dtype.kind not in "iuf":
         raise InputError(path, f"holds values of type {array.dtype}, not numbers", COLUMNS_REMEDY)
-    if array.ndim == 3 and array.shape[2] == 3:  # one point per pixel, without one where depth is missing
+    if array.ndim == 3 and array.shape[2] == 3:  # one point per pixel
         array = array.reshape(-1, 3)
-        array = array[np.isfinite(array).all(axis=1)]
     wrong = array.ndim == 2 and array.shape[0] == 3 != array.shape[1]  # three points are no cloud
     if array.ndim != 2 or array.shape[1] < 3 or wrong:
         raise InputError(path, f"has the shape {array.shape}, not (N, 3)", "transpose it" if wrong else COLUMNS_REMEDY)
@@ -191,8 +192,11 @@ def _text(path: Path) -> np.ndarray:
         raise InputError(path, f"has {len(words)} columns", COLUMNS_REMEDY)
     with warnings.catch_warnings(), refusing(path, "is no table of numbers ({})", COLUMNS_REMEDY):
         warnings.simplefilter("ignore", UserWarning)  # of a table without rows
-        text = io.StringIO("\n".join(lines[is_head:]))
-        table = np.loadtxt(text, np.float64, delimiter=separator, ndmin=2, usecols=columns, comments=None)
+        text = "\n".join(["", *lines[is_head:], ""])
+        if separator and any(gap in text for gap in (2 * separator, f"{separator}\n", f"\n{separator}")):
+            # pandas writes nothing for NaN
+            text = re.sub(f"(?m)^(?={separator})|(?<={separator})(?={separator}|$)", "nan", text)
+        table = np.loadtxt(io.StringIO(text), np.float64, delimiter=separator, ndmin=2, usecols=columns, comments=None)
     if table.shape[1] != 3 or not len(table):
         raise InputError(path, "has no points", COLUMNS_REMEDY)
     return table
@@ -204,21 +208,38 @@ def _is_number(word: str) -> bool:
     return False
 
 
-def _kitti(path: Path) -> np.ndarray:
-    rows, remedy = "rows of 4 float32 (x, y, z, intensity)", "give a scan of KITTI, or save it as npy"
-    if path.stat().st_size % (4 * KITTI_COLUMNS):
-        raise InputError(path, f"has {path.stat().st_size} bytes, which are no {rows}", remedy)
-    points = np.fromfile(path, "<f4").reshape(-1, KITTI_COLUMNS)[:, :3].astype(np.float64)
-    with np.errstate(invalid="ignore"):
-        if not (np.abs(points) <= FARTHEST_KITTI).all():
-            raise InputError(path, f"holds no {rows} in meters, as scans of KITTI do", remedy)
-    return points
+def _scanner_bin(path: Path) -> np.ndarray:
+    """Read rows of `BIN_COLUMNS`: as many as the size allows and the values bear out, in one way alone."""
+    remedy = "give one of KITTI or nuScenes, or save it as npy"
+    widths = BIN_COLUMNS[1:] if path.name.lower().endswith(NUSCENES) else BIN_COLUMNS
+    values = np.fromfile(path, "<f4") if path.stat().st_size % 4 == 0 else np.zeros(0, "<f4")
+    tables = [values.reshape(-1, width) for width in widths if len(values) and len(values) % width == 0]
+    fitting = [table for table in tables if _is_scan(table)]
+    if len(fitting) != 1:
+        rows = " or ".join(map(str, widths))
+        holds = "may hold" if fitting else "does not hold"
+        raise InputError(path, f"{holds} rows of {rows} float32: x, y, z in meters, intensity, ring", remedy)
+    return fitting[0][:, :3].astype(np.float64)
+
+
+def _is_scan(table: np.ndarray) -> bool:
+    """Return whether rows can be x, y, z, an intensity and perhaps the number of a ring; x, y, z may be NaN."""
+    table = table[np.isfinite(table).all(axis=1)].astype(np.float64)
+    ring = table[:, 4:]
+    sizes = np.abs(table).mean(axis=0) if len(table) else np.zeros(table.shape[1])
+    return bool(
+        (np.abs(table[:, :3]) <= FARTHEST_SCANNED).all()
+        and (table[:, 3:] >= 0).all()
+        and (ring < MOST_RINGS).all()
+        and (ring == np.round(ring)).all()
+        and sizes.max() > LEAST_CONTRAST * sizes.min()
+    )
 
 
 TABLE_READERS: dict[str, Callable[[Path], np.ndarray]] = {
     **dict.fromkeys((".npy", ".npz"), _numpy_file),
-    **dict.fromkeys((".xyz", ".csv"), _text),
-    ".bin": _kitti,
+    **dict.fromkeys((".xyz", ".csv", ".txt", ".asc", ".pts"), _text),
+    ".bin": _scanner_bin,
 }
 
 
@@ -283,4 +304,7 @@ def _chosen(views: list[tuple[str, Callable[[], bytes], str]], scale: float, mos
     views = sorted(views, key=lambda view: view_order(view[0]))
     for _, group in groupby(views, key=lambda view: instance_of(view[0])):
         for name, read, subject in evenly(list(group), most):
-            yield Surface(name, parse_pcd(read(), subject) * scale, None)
+            points = parse_pcd(read(), subject)
+            points = points[~np.isnan(points).any(axis=1)]  # missing depth; infinity is a fault
+            require_points(points, subject)
+            yield Surface(name, points * scale, None)

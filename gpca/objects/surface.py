@@ -47,8 +47,8 @@ def view_order(name: str) -> tuple[str, int, int]:
     return (match[1], int(match[2]), int(match[3])) if match else (name, 0, 0)
 
 
-IN_CONFIG, AS_OPTION, AS_ARGUMENT = "set unit: {}", "give --unit {}", "pass unit='{}'"
 METERS_PER_UNIT = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+UNIT_NAMES = {"m": "meters", "cm": "centimeters", "mm": "millimeters"}
 
 
 def meters_per(unit: str | None) -> float:
@@ -58,12 +58,41 @@ def meters_per(unit: str | None) -> float:
     return METERS_PER_UNIT[unit]
 
 
+def in_unit(points: np.ndarray, own_unit: str | None, unit: str) -> np.ndarray:
+    """Convert points to a unit from one of their own, if they have one."""
+    return points if own_unit in (None, unit) else points * (meters_per(own_unit) / meters_per(unit))
+
+
 REMEDY = "give an (N, 3) array or a point cloud of Open3D"
 
 
-def as_points(cloud: Any, role: str) -> np.ndarray:
-    """Return the points (N, 3) float64 of an array, a list, a tensor, or a cloud of Open3D, old or new, of this role.
+FEWEST_ZEROS = 2  # rows (0, 0, 0) that are no points; a single one may be
 
+
+def measured(points: np.ndarray, role: object, notes: list[str] | None = None) -> np.ndarray:
+    """Return the rows (n, 3) that hold a measurement, and add a note on the others; InputError if none does.
+
+    Depth cameras write NaN or (0, 0, 0) where depth is missing.
+    """
+    infinite_N = ~np.isfinite(points).all(axis=1)
+    zero_N = ~points.any(axis=1)
+    zero_N &= zero_N.sum() >= FEWEST_ZEROS
+    missing_N = infinite_N | zero_N
+    if not (count := int(missing_N.sum())):
+        return points
+    kinds = {"(0, 0, 0)": zero_N, "NaN or infinite": infinite_N}
+    why = f"{' or '.join(kind for kind, rows_N in kinds.items() if rows_N.any())}, as where depth is missing"
+    if count == len(points):
+        raise InputError(role, f"all of its {count} points are {why}", "save it again with its depths")
+    if notes is not None:
+        notes.append(f"{role}: {count} of {len(points)} points were left out: they are {why}")
+    return points[~missing_N]
+
+
+def as_points(cloud: Any, role: str, notes: list[str] | None = None) -> np.ndarray:
+    """Return the points (n, 3) float64 of an array, a list, a tensor, or a cloud of Open3D, old or new, of this role.
+
+    Rows without a measurement are left out, with a note (:func:`measured`).
     Open3D is not imported: its clouds are recognized by ``points`` or ``point.positions``.
     """
     values = cloud
@@ -87,4 +116,4 @@ def as_points(cloud: Any, role: str) -> np.ndarray:
     if points.ndim != 2 or points.shape[1] != 3:
         advice = "transpose it" if points.ndim == 2 and points.shape[0] == 3 else REMEDY
         raise InputError(role, f"has the shape {points.shape}, not (N, 3)", advice)
-    return points
+    return measured(points, role, notes)

@@ -14,7 +14,7 @@ from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays
 from gpca.io.container import Container, array, require_same_samples
 from gpca.io.csv_file import numbers, read_csv
 from gpca.io.files import SPLITS
-from gpca.objects.canonical import LARGEST_DIAMETER_M, SMALLEST_DIAMETER_M
+from gpca.objects.sizes import LARGEST_DIAMETER_M, SMALLEST_DIAMETER_M
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.rigid import inverse, scale_translation, transform
 

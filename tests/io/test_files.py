@@ -87,7 +87,7 @@ READERS = {
     "data.zip": lambda path: next(iter(open_archive(path).__enter__())),
     "view.pcd": lambda path: next(point_files.from_entry({}, path.parent)),
     "part.obj": lambda path: read_surface(path, 1.0),
-    **{f"cloud.{suffix}": lambda path: read_points(path, "m") for suffix in ("ply", "pcd", "obj", "stl", "off")},
+    **{f"cloud.{suffix}": lambda path: read_points(path) for suffix in ("ply", "pcd", "obj", "stl", "off")},
 }
 everywhere = pytest.mark.parametrize("name", READERS)
 

@@ -5,13 +5,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from gpca import Explainer
 from gpca.errors import InputError
-from gpca.model.clouds import MEASURES, Familiarity, hidden_share, measure, read_points, read_pose, voids_of
+from gpca.model.clouds import (
+    MEASURES,
+    Familiarity,
+    hidden_share,
+    measure,
+    read_points,
+    read_pose,
+    read_target,
+    voids_of,
+)
 from gpca.model.diagnosis import ADVICE, CHECK, UNKNOWN
 from gpca.objects.canonical import canonical_cloud
 from gpca.objects.procedural import FAMILIES, surfaces
+from gpca.objects.sizes import AS_OPTIONS, require_sizes
 from gpca.rigid import exp
 
 trimesh = pytest.importorskip("trimesh")
@@ -31,18 +42,18 @@ def written(folder, name, points=POINTS):
 
 @pytest.mark.parametrize("name", ["cloud.ply", "cloud.pcd", "CLOUD.PLY"])
 def test_a_cloud_keeps_its_points_in_its_unit(tmp_path, name):
-    points, frame = read_points(written(tmp_path, name.lower()).rename(tmp_path / name), "m")
+    points, frame = read_target(written(tmp_path, name.lower()).rename(tmp_path / name))
     np.testing.assert_allclose(points, POINTS, atol=1e-7)
-    in_mm, frame_mm = read_points(written(tmp_path, "mm.ply", 1e3 * POINTS), "mm")
+    in_mm, frame_mm = read_target(written(tmp_path, "mm.ply", 1e3 * POINTS))
     np.testing.assert_allclose(in_mm, 1e3 * POINTS, rtol=1e-6, atol=1e-4)
     assert frame_mm.diameter == pytest.approx(1e3 * frame.diameter)
 
 
-@pytest.mark.parametrize("suffix", ["stl", "obj", "off", "ply"])
+@pytest.mark.parametrize("suffix", ["stl", "obj", "off", "ply", "glb"])
 def test_a_mesh_is_sampled_in_its_own_frame_and_measured_by_its_vertices(tmp_path, suffix):
     box = trimesh.creation.box((30, 40, 120)).apply_translation((500, 0, 0))
     box.export(tmp_path / f"box.{suffix}")
-    points, frame = read_points(tmp_path / f"box.{suffix}", "mm")
+    points, frame = read_target(tmp_path / f"box.{suffix}")
     assert len(points) > 10_000
     np.testing.assert_allclose(frame.center_3, (500, 0, 0), atol=1e-3)
     assert frame.diameter == pytest.approx(130)
@@ -50,25 +61,59 @@ def test_a_mesh_is_sampled_in_its_own_frame_and_measured_by_its_vertices(tmp_pat
 
 
 @pytest.mark.parametrize(
-    ("make", "unit", "message"),
+    ("make", "message"),
     [
-        (lambda f: f / "lost.ply", "m", "lost.ply: no such file; give one of .ply"),
-        (lambda f: written(f, "few.ply", POINTS[:63]), "m", "few.ply: has 63 points; give 64 or more"),
-        (lambda f: written(f, "one.ply", POINTS[:1]), "m", "one.ply: has 1 points"),
-        (lambda f: written(f, "few.pcd", POINTS[:10]), "m", "few.pcd: has 10 points"),
-        (lambda f: written(f, "nan.ply", np.where(POINTS > 0.29, np.nan, POINTS)), "m", "nan.ply: .* contain NaN"),
-        (
-            lambda f: written(f, "mm.ply", 1e3 * POINTS),
-            "m",
-            "mm.ply: its diameter is .* in millimeters. give --unit mm",
-        ),
-        (lambda f: written(f, "m.ply"), "mm", "m.ply: its diameter is .* m, so the declared unit"),
-        (lambda f: written(f, "cloud.ply").rename(f / "cloud.abc"), "m", "cloud.abc: has an unsupported format"),
+        (lambda f: f / "lost.ply", "lost.ply: no such file; give one of .ply"),
+        (lambda f: written(f, "few.ply", POINTS[:63]), "few.ply: has 63 points; give 64 or more"),
+        (lambda f: written(f, "one.ply", POINTS[:1]), "one.ply: has 1 points"),
+        (lambda f: written(f, "few.pcd", POINTS[:10]), "few.pcd: has 10 points"),
+        (lambda f: written(f, "nan.pcd", np.nan * POINTS), "nan.pcd: all of its 200 points are NaN or infinite"),
+        (lambda f: written(f, "zeros.ply", 0 * POINTS), r"zeros.ply: all of its 200 points are \(0, 0, 0\), as where"),
+        (lambda f: written(f, "cloud.ply").rename(f / "cloud.abc"), "cloud.abc: has an unsupported format"),
     ],
 )
-def test_a_file_that_cannot_be_right_is_one_line(tmp_path, make, unit, message):
+def test_a_file_that_cannot_be_right_is_one_line(tmp_path, make, message):
     with pytest.raises(InputError, match=message):
-        read_points(make(tmp_path), unit)
+        read_points(make(tmp_path))
+
+
+@pytest.mark.parametrize("name", ["cloud.ply", "cloud.pcd"])
+def test_rows_without_a_measurement_are_no_part_of_a_target(tmp_path, name):
+    beside = np.full((60, 3), 0.0)
+    beside[::2] = np.nan
+    points, frame = read_target(written(tmp_path, name, np.r_[POINTS + 5, beside]))
+    assert len(points) == 260  # they are kept, so that the explanation counts them
+    np.testing.assert_allclose(frame.center_3, 5 + (POINTS.min(axis=0) + POINTS.max(axis=0)) / 2, atol=1e-6)
+
+
+SIZES = [
+    ((0.04, 43.0), ("m", "m"), "source: looks 1100 times smaller than the target; .* --source-unit m --unit mm"),
+    ((0.04, 43.0), ("mm", "mm"), "source: looks 1100 times smaller than the target; .* --source-unit m --unit mm"),
+    ((300.0, 0.3), ("m", "m"), "source: looks 1000 times larger than the target; .* --source-unit mm --unit m"),
+    ((300.0, 300.0), ("m", "mm"), "source: looks 1000 times larger than the target; .* --source-unit mm --unit mm"),
+    ((30.0, 0.3), ("m", "m"), "source: looks 100 times larger than the target; .* --source-unit cm --unit m"),
+    ((300.0, 250.0), ("m", "m"), "target: its diameter is 250 m, but objects span 1 mm to 10 m; is it in millimeters"),
+    ((0.3, 0.25), ("mm", "mm"), "target: its diameter is 0.00025 m, but .*; is it in meters. give --unit m; scans"),
+    (
+        (3e-4, 3.5e-4),
+        ("m", "m"),
+        "target: its diameter is 0.00035 m, but objects span 1 mm .*; scans .*: --scans$",
+    ),
+    ((5.0, 0.4), ("m", "m"), "source: is 12.5 times as large as the target; give both in the same unit"),
+    ((0.0, 0.4), ("m", "m"), "source: is 0 times as large as the target"),
+    ((3e4, 2e4), ("m", "m"), "target: .* objects span 1 mm to 10 m; scans of any size: --scans$"),
+]
+
+
+@pytest.mark.parametrize(("extents", "units", "message"), SIZES)
+def test_sizes_are_advised_by_the_units_that_were_given(extents, units, message):
+    with pytest.raises(InputError, match=message):
+        require_sizes(("source", "target"), extents, extents[1], units, AS_OPTIONS)
+
+
+@pytest.mark.parametrize(("extents", "units"), [((0.04, 43.0), ("m", "mm")), ((0.3, 1.0), ("m", "m"))])
+def test_sizes_that_fit_their_units(extents, units):
+    require_sizes(("source", "target"), extents, extents[1], units, AS_OPTIONS)
 
 
 @pytest.mark.parametrize("name", ["cloud.ply", "cloud.pcd", "box.stl", "box.obj", "box.ply"])
@@ -80,23 +125,40 @@ def test_a_cloud_or_mesh_that_an_offset_has_rounded_is_refused(tmp_path, name):
         mesh.vertices = (mesh.vertices + 1e6).astype(np.float32).astype(float)
         mesh.export(path := tmp_path / name)
     with pytest.raises(InputError, match=rf"{name}: at coordinates of 1e\+06, float32 has steps of 0.062, .* subtract"):
-        read_points(path, "m")
-    read_points(written(tmp_path, "near.ply", (POINTS + 1e3).astype(np.float32)), "m")
+        read_points(path)
+    read_points(written(tmp_path, "near.ply", (POINTS + 1e3).astype(np.float32)))
 
 
-def test_a_pose_is_16_numbers_however_they_are_parted(tmp_path):
-    T = exp(np.array([[0.1, 0.2, 0.3, 1.0, 2.0, 3.0]]))[0]
-    np.savetxt(tmp_path / "rows.txt", T)
-    (tmp_path / "commas.txt").write_text(", ".join(map(str, T.ravel())))
-    for name in ("rows.txt", "commas.txt"):
-        np.testing.assert_allclose(read_pose(tmp_path / name), T)
+T = exp(np.array([[0.1, 0.2, 0.3, 1.0, 2.0, 3.0]]))[0]
+TUM = [*T[:3, 3], *Rotation.from_matrix(T[:3, :3]).as_quat()]
+POSES = {
+    "rows.txt": lambda path: np.savetxt(path, T),
+    "three_rows.txt": lambda path: np.savetxt(path, T[:3]),
+    "commas.txt": lambda path: path.write_text(", ".join(map(str, T.ravel()))),
+    "kitti.txt": lambda path: path.write_text(" ".join(map(str, T[:3].ravel())) + "\n"),
+    "printed.txt": lambda path: path.write_text(f"# the result\n{T!r}".replace("array", "")),
+    "json.txt": lambda path: path.write_text(json.dumps(T.tolist())),
+    "tum.txt": lambda path: path.write_text(" ".join(map(str, TUM))),
+    "with_time.txt": lambda path: path.write_text(
+        "# time tx ty tz qx qy qz qw\n1305031102.1753 " + " ".join(map(str, TUM)) + "\n"
+    ),
+    "pose.npy": lambda path: np.save(path, T),
+    "three_rows.npy": lambda path: np.save(path, T[:3]),
+    "tum.npy": lambda path: np.save(path, TUM),
+}
+
+
+@pytest.mark.parametrize("name", POSES)
+def test_a_pose_is_read_in_every_form(tmp_path, name):
+    POSES[name](tmp_path / name)
+    np.testing.assert_allclose(read_pose(tmp_path / name), T, atol=1e-6)
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
         (None, "no such file"),
-        ("1 0 0", "contains 3 numbers; give 4×4"),
+        ("1 0 0", "contains 3 numbers; give 4×4 or 3×4 numbers"),
         ("one " * 16, "is not a number"),
         (" ".join(map(str, (2 * np.eye(4)).ravel())), "the pose is not a rigid transform"),
         (" ".join(map(str, np.diag([-1, 1, 1, 1]).ravel())), "the pose is not a rigid transform"),
@@ -105,6 +167,11 @@ def test_a_pose_is_16_numbers_however_they_are_parted(tmp_path):
         (" ".join(map(str, np.eye(4).astype(int).ravel())).replace(" 0", " 0_0"), "'0_0' is not a finite decimal"),
         (" ".join(map(str, (np.eye(4) + np.eye(4, k=3) * 1e16).ravel())), "the pose has a translation of 1e\\+16"),
         (" ".join(map(str, np.diag([1, 1, 1, 5]).ravel())), "the pose is not a rigid transform"),
+        ("1 2 3 0 0 0 2", "qx qy qz qw, are no unit quaternion; give 4×4"),
+        ("0 1 2 3 0 0 0 1\n1 1 2 3 0 0 0 1\n", "contains 16 numbers in lines of 8; give 4×4"),
+        ("1 2 3 0 0 0 1\n1 2 3 0 0 0 1\n", "contains 14 numbers in lines of 7; give 4×4"),
+        ("1 2 3 0\n0 0 1\n", "contains 7 numbers; give 4×4"),
+        ("1 0 0 0 " * 6, "contains 24 numbers; give 4×4"),
     ],
 )
 def test_what_is_no_pose(tmp_path, text, message):

@@ -89,6 +89,27 @@ def test_more_points_than_in_the_training_are_left_out_and_said_so(explainer, pa
     assert explanation.scores == again.scores
 
 
+def test_rows_without_a_measurement_are_left_out_and_said_so(explainer, pair):
+    source, target = pair
+    here = explainer.explain(source, target)
+    missing = np.r_[source, np.zeros((40, 3)), np.full((2, 3), np.nan)]
+    explanation = explainer.explain(missing, np.r_[target, np.full((5, 3), np.inf)])
+    assert explanation.notes[:2] == (
+        f"source: 42 of {len(source) + 42} points were left out: they are (0, 0, 0) or NaN or infinite, as where depth "
+        "is missing",
+        f"target: 5 of {len(target) + 5} points were left out: they are NaN or infinite, as where depth is missing",
+    )
+    np.testing.assert_array_equal(explanation.T_target_source, here.T_target_source)
+    assert len(explainer.explain(np.r_[source, np.zeros((1, 3))], target).notes) == 1  # that may be a point
+
+
+def test_a_source_in_a_unit_of_its_own_gives_results_in_that_of_the_target(explainer, pair):
+    source, target = pair
+    in_mm = explainer.explain(1e3 * source, target, source_unit="mm")
+    assert scores(in_mm) == pytest.approx(scores(explainer.explain(source, target)), abs=1e-6)
+    assert in_mm.unit == "m"
+
+
 def test_many_are_explained_as_one_by_one_and_a_fault_names_its_pair(explainer, pair):
     source, target = pair
     T_init = exp(np.array([[0.1, 0, 0, 0, 0, 0]]))[0]
@@ -118,7 +139,7 @@ def moved(x):
     [
         (lambda s, t: {"source_points": s[:10]}, "source: has 10 points; give 64"),
         (lambda s, t: {"target_points": t[:10]}, "target: has 10 points"),
-        (lambda s, t: {"source_points": s * np.nan}, "source: .*contain NaN"),
+        (lambda s, t: {"source_points": s * np.nan}, "source: all of its .* points are NaN or infinite"),
         (lambda s, t: {"source_points": s[:, :2]}, "source: has the shape .*, not \\(N, 3\\)"),
         (lambda s, t: {"source_points": s.T}, "source: has the shape .* transpose it"),
         (lambda s, t: {"target_points": "cloud.ply"}, "target: is a str, not a cloud of points"),
@@ -126,6 +147,8 @@ def moved(x):
         (lambda s, t: {"source_points": s / 10}, "source: is 0.* times as large as the target"),
         (lambda s, t: {"unit": "mm"}, "target: its diameter is"),
         (lambda s, t: {"unit": "feet"}, "unit 'feet'"),
+        (lambda s, t: {"source_unit": "feet"}, "unit 'feet'"),
+        (lambda s, t: {"source_points": 1e3 * s}, "source: looks .* larger .*: pass source_unit='mm', unit='m'"),
         (lambda s, t: {"T_target_source_init": 2 * np.eye(4)}, "initial pose: the pose is not a rigid transform"),
         (lambda s, t: {"T_target_source_init": moved(1e16)}, "initial pose: the pose has a translation of 1e\\+16"),
         (lambda s, t: {"T_target_source_init": moved(1e15)}, FAR),

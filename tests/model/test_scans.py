@@ -11,7 +11,7 @@ import trimesh
 from gpca import explain_scans
 from gpca.__main__ import main
 from gpca.errors import InputError
-from gpca.model.clouds import read_scan
+from gpca.model.clouds import read_points
 from gpca.model.explanation import NOT_SURE
 from gpca.model.scan_registration import in_voxels, voxel_size
 from gpca.process.environment import open3d_cloud
@@ -117,9 +117,9 @@ WIDE = np.random.default_rng(0).uniform(-40, 40, (200, 3))
 WRITERS = {
     "npy": np.save,
     "npz": lambda path, points: np.savez(path, points=points),
-    "xyz": np.savetxt,
+    **dict.fromkeys(("xyz", "txt", "asc", "pts"), np.savetxt),
     "csv": lambda path, points: np.savetxt(path, points, delimiter=","),
-    "bin": lambda path, points: np.column_stack([points, points[:, 0]]).astype("<f4").tofile(path),
+    "bin": lambda path, points: np.column_stack([points, np.abs(points[:, 0]) / 40]).astype("<f4").tofile(path),
     "ply": lambda path, points: trimesh.PointCloud(points).export(path),
     "las": lambda path, points: path.write_bytes(b"LASF"),
 }
@@ -129,13 +129,13 @@ WRITERS = {
 def test_a_scan_of_80_m_is_read_from_every_format(tmp_path, monkeypatch, suffix):
     WRITERS[suffix](path := tmp_path / f"scan.{suffix}", WIDE)
     monkeypatch.setitem(sys.modules, "laspy", SimpleNamespace(read=lambda path: SimpleNamespace(xyz=WIDE)))
-    np.testing.assert_allclose(read_scan(path), WIDE, atol=1e-5)
+    np.testing.assert_allclose(read_points(path), WIDE, atol=1e-5)
 
 
 def test_points_are_drawn_on_a_mesh_of_any_size(tmp_path):
     box = trimesh.creation.box((30, 40, 120)).apply_translation((500, 0, 0))
     box.export(tmp_path / "box.stl")
-    points = read_scan(tmp_path / "box.stl")
+    points = read_points(tmp_path / "box.stl")
     np.testing.assert_allclose([points.min(axis=0), points.max(axis=0)], box.bounds, atol=0.05)
     assert voxel_size({"box": points}, "m") < 5
 
@@ -162,7 +162,7 @@ def test_voxels_are_chosen_by_the_spacing_and_leave_few(scans):
         ({"unit": "feet"}, "unit 'feet'"),
         ({"T_target_source_init": 2 * np.eye(4)}, "initial pose: the pose is not a rigid transform"),
         (
-            dict.fromkeys(("source_points", "target_points"), np.zeros((99, 3))),
+            dict.fromkeys(("source_points", "target_points"), np.ones((99, 3))),
             "source: has all its points in one place",
         ),
     ],

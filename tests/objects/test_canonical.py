@@ -241,7 +241,7 @@ def test_a_pose_outside_moves_points_as_it_does_inside():
         (np.where(np.arange(500)[:, None] == 7, np.nan, CUBOID), "m", "target: 1 of 500 points contain NaN"),
         (CUBOID * [1, 0, 0], "m", "all its points coincide or lie on one line"),
         (CUBOID * 1000, "m", "diameter is 1300 m, .*unit: mm"),
-        (CUBOID * 1e-3, "mm", "diameter is 1.3e-06 m, .*unit: m"),
+        (CUBOID * 1e-3, "mm", "diameter is 0.0000013 m, .*unit: m"),
         (CUBOID, "inch", "unit 'inch'"),
     ],
 )

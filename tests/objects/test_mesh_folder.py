@@ -27,23 +27,60 @@ def ascii_ply(vertices, faces=(), normals=None):
     return (header + "end_header\n" + "\n".join(lines) + "\n").encode()
 
 
+QUADS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+VTK_END = "POINT_DATA 8\nSCALARS heat float 1\nLOOKUP_TABLE default\n"
+
+
+def vtk_text(vertices, faces=(), end=VTK_END):
+    rows = [" ".join(map(str, row)) for row in vertices]
+    cells = [" ".join(map(str, (len(face), *face))) for face in faces]
+    size = len(" ".join(cells).split())
+    head = f"# vtk DataFile Version 3.0\na box\nASCII\nDATASET POLYDATA\nPOINTS {len(rows)} double\n"
+    cells = [f"POLYGONS {len(cells)} {size}", *cells] if cells else []
+    return "\n".join([head + "  ".join(rows), *cells, end])
+
+
+def vtk_binary(vertices, faces, version=3):
+    """As VTK writes them: arrays among the head, and from version 5 on offsets instead of lengths."""
+    head = f"# vtk DataFile Version {version}.1\na box\nBINARY\nDATASET POLYDATA\n"
+    field = b"FIELD FieldData 1\ntime 1 1 double\n" + np.array([2.5], ">f8").tobytes() + b"\n"
+    points = f"POINTS {len(vertices)} float\n".encode() + np.asarray(vertices, ">f4").tobytes()
+    metadata = b"\nMETADATA\nINFORMATION 1\nNAME L2_NORM_RANGE LOCATION vtkDataArray\nDATA 2 1 2\n\n"
+    if version == 5:
+        offsets = np.arange(0, 3 * len(faces) + 1, 3).astype(">i8").tobytes()
+        cells = f"POLYGONS {len(faces) + 1} {3 * len(faces)}\nOFFSETS vtktypeint64\n".encode() + offsets
+        cells += b"\nCONNECTIVITY vtktypeint64\n" + np.asarray(faces, ">i8").tobytes()
+    else:
+        cells = f"POLYGONS {len(faces)} {4 * len(faces)}\n".encode()
+        cells += np.column_stack([np.full(len(faces), 3), faces]).astype(">i4").tobytes()
+    return head.encode() + field + points + metadata + cells + b"\n" + VTK_END.encode()
+
+
 def exported(kind):
     data = {
         "binary.ply": lambda: BOX.export(file_type="ply", encoding="binary"),
         "ascii.ply": lambda: ascii_ply(np.asarray(BOX.vertices), np.asarray(BOX.faces)),
         "quads.ply": lambda: ascii_ply(
             np.asarray(BOX.vertices),
-            [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)],
+            QUADS,
         ),
         "plain.obj": lambda: BOX.export(file_type="obj"),
         "binary.stl": lambda: BOX.export(file_type="stl"),
         "ascii.stl": lambda: BOX.export(file_type="stl_ascii"),
         "plain.off": lambda: BOX.export(file_type="off"),
+        "binary.glb": lambda: BOX.export(file_type="glb"),
+        "ascii.vtk": lambda: vtk_text(BOX.vertices, BOX.faces),
+        "quads.vtk": lambda: vtk_text(BOX.vertices, QUADS),
+        "binary.vtk": lambda: vtk_binary(BOX.vertices, BOX.faces),
+        "offsets.vtk": lambda: vtk_binary(BOX.vertices, BOX.faces, version=5),
     }[kind]()
     return data.encode() if isinstance(data, str) else data
 
 
-KINDS = ("binary.ply", "ascii.ply", "quads.ply", "plain.obj", "binary.stl", "ascii.stl", "plain.off")
+KINDS = (
+    *("binary.ply", "ascii.ply", "quads.ply", "plain.obj", "binary.stl", "ascii.stl", "plain.off", "binary.glb"),
+    *("ascii.vtk", "quads.vtk", "binary.vtk", "offsets.vtk"),
+)
 
 
 def read(path, unit="mm"):
@@ -70,7 +107,7 @@ def test_obj_with_two_materials_is_one_mesh(tmp_path):
     assert trimesh.Trimesh(surface.vertices_m, surface.faces).area == pytest.approx(1)
 
 
-def test_ply_without_faces_is_a_cloud(tmp_path):
+def test_ply_without_faces_is_a_cloud(tmp_path, capsys):
     vertices, normals = np.random.default_rng(0).normal(size=(2, 70, 3))
     path = tmp_path / "cloud.ply"
     path.write_bytes(ascii_ply(vertices))
@@ -82,13 +119,39 @@ def test_ply_without_faces_is_a_cloud(tmp_path):
     assert read(path).normals == pytest.approx(normals / np.linalg.norm(normals, axis=1, keepdims=True))
     normals[4] = 0
     path.write_bytes(ascii_ply(vertices, normals=normals))
-    with pytest.raises(InputError, match=r"cloud\.ply.*normal"):
-        read(path)
+    assert read(path).normals is None  # estimated where they are needed
+    assert "cloud.ply: 1 of 70 normals are zero or NaN, so none of them is used" in capsys.readouterr().err
+
+
+def test_vtk_and_glb_without_faces_are_clouds(tmp_path):
+    points = np.random.default_rng(0).normal(size=(70, 3))
+    (tmp_path / "cloud.vtk").write_text(vtk_text(points))
+    trimesh.PointCloud(points).export(tmp_path / "cloud.glb")
+    for name in ("cloud.vtk", "cloud.glb"):
+        surface = read(tmp_path / name, "m")
+        assert surface.faces is None
+        np.testing.assert_allclose(surface.vertices_m, points, atol=1e-6)
+
+
+def test_meshes_of_glb_stand_where_their_nodes_put_them(tmp_path):
+    scene, turned = trimesh.Scene(), trimesh.transformations.rotation_matrix(0.5, (1, 2, 3), (4, 5, 6))
+    scene.add_geometry(BOX, node_name="a", transform=turned)
+    scene.add_geometry(BOX, node_name="b", parent_node_name="a", transform=turned)
+    (tmp_path / "two.glb").write_bytes(scene.export(file_type="glb"))
+    surface = read(tmp_path / "two.glb", "m")
+    expected = trimesh.transform_points(BOX.vertices, turned)
+    both = np.r_[expected, trimesh.transform_points(expected, turned)]
+    np.testing.assert_allclose(surface.vertices_m, both, atol=1e-4)
+    assert trimesh.Trimesh(surface.vertices_m, surface.faces).area == pytest.approx(2 * BOX.area, rel=1e-5)
 
 
 # An OBJ declares no counts: one that ends after some faces is whole for all that can be known.
+# So may one of VTK after its faces, since its values are not read.
 TRUNCATED = [
-    (kind, kept) for kind in KINDS for kept in (0.0, 0.2, 0.5, 0.8, 0.97) if kind != "plain.obj" or kept <= 0.5
+    (kind, kept)
+    for kind in KINDS
+    for kept in (0.0, 0.2, 0.5, 0.8, 0.97)
+    if kept <= 0.5 or (kind != "plain.obj" and not kind.endswith("vtk"))
 ]
 
 
@@ -107,6 +170,10 @@ BROKEN = {
     "inf.obj": (b"v 0 0 0\nv 0 inf 0\nv 1 0 0\nf 1 2 3\n", "NaN or infinity"),
     "wild.ply": (ascii_ply([(0, 0, 0), (0, 1, 0), (1, 0, 0)], [(0, 1, 3)]), "refers to a missing vertex"),
     "text.ply": (b"hello\n", "readable"),
+    "grid.vtk": (vtk_text(BOX.vertices).replace("POLYDATA", "UNSTRUCTURED_GRID").encode(), "not 'DATASET POLYDATA'"),
+    "strips.vtk": (vtk_text(BOX.vertices, BOX.faces).replace("POLYGONS", "TRIANGLE_STRIPS").encode(), "strips"),
+    "wild.vtk": (vtk_text(BOX.vertices, [(0, 1, 8)]).encode(), "refers to a missing vertex"),
+    "more.vtk": (vtk_text(BOX.vertices, QUADS).replace("POLYGONS 6", "POLYGONS 7").encode(), "6 cells stand where 7"),
     "digits.off": ("OFF\n3 1 0\n٣ 0 0\n0 1 0\n0 0 1\n3 0 1 2\n".encode(), "'٣' is not a finite decimal number"),
 }
 

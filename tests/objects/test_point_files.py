@@ -75,12 +75,13 @@ def test_agrees_with_open3d(encoding, tmp_path):
             parse_pcd(content[:kept], "x")
 
 
-def test_organised_cloud_drops_missing_depth():
-    assert len(parse_pcd(ascii_pcd(ROWS, width=2, height=2), "x")) == 3
-    with pytest.raises(InputError, match="infinity"):
-        parse_pcd(ascii_pcd([*ROWS[:3], "inf 0 0 0 0 0"], width=2, height=2), "x")
-    with pytest.raises(InputError, match=r"view\.pcd: 1 of 4 points contain NaN"):
-        parse_pcd(ascii_pcd(ROWS), "view.pcd")  # one without an image's rows
+def test_views_have_no_points_where_depth_is_missing(tmp_path):
+    (tmp_path / "a_1_1_1.pcd").write_bytes(ascii_pcd(ROWS, width=2, height=2))
+    [view] = from_entry({}, tmp_path)
+    assert len(view.vertices_m) == 3
+    (tmp_path / "a_1_1_1.pcd").write_bytes(ascii_pcd([*ROWS[:3], "inf 0 0 0 0 0"], width=2, height=2))
+    with pytest.raises(InputError, match=r"a_1_1_1\.pcd: 1 of 3 points contain NaN or infinity"):
+        list(from_entry({}, tmp_path))
 
 
 GOOD = ascii_pcd([ROWS[0], ROWS[1]]).decode()
@@ -99,7 +100,6 @@ WRONG = {
     "rows missing": (GOOD.replace("WIDTH 2", "WIDTH 9").replace("POINTS 2", "POINTS 9"), "9×6"),
     "value missing": (GOOD.replace(" 315 218", " 315"), "column"),
     "no number": (GOOD.replace("0.75", "abc"), "abc"),
-    "no rows": (ascii_pcd([], points=0).decode(), "has no points"),
 }
 
 
@@ -132,10 +132,15 @@ def text(separator, head="", rows=WIDE):
     return lambda path: path.write_text(f"{head}{body}\n")
 
 
+def scanned(columns):
+    """Rows of KITTI (4 columns) or nuScenes (5)."""
+    return np.column_stack([WIDE, np.arange(70) % 32, WIDE])[:, :columns].astype("<f4")
+
+
 FILES = {
     "cloud.npy": lambda path: np.save(path, WIDE),
     "single.npy": lambda path: np.save(path, POINTS.astype(np.float32)),
-    "pixels.npy": lambda path: np.save(path, np.insert(POINTS, 5, np.nan, axis=0)[:, None]),
+    "pixels.npy": lambda path: np.save(path, POINTS.reshape(7, 10, 3)),
     "named.npy": lambda path: np.save(path, np.rec.fromarrays(POINTS.T, names="x,y,z")),
     "cloud.npz": lambda path: np.savez(path, normals=-POINTS, points=POINTS),
     "only.npz": lambda path: np.savez_compressed(path, whatever=POINTS),
@@ -143,7 +148,12 @@ FILES = {
     "count.xyz": text(" ", "70\n"),
     "cloud.csv": text(","),
     "head.csv": text(";", "intensity;Z;y;x\n", WIDE[:, ::-1]),
+    "cloud.txt": text(" "),
+    "cloud.asc": text("\t", "//X Y Z I\n"),
+    "cloud.pts": text(" ", "70\n"),
     "cloud.bin": lambda path: WIDE.astype("<f4").tofile(path),
+    "ring.bin": lambda path: scanned(5).tofile(path),
+    "cloud.pcd.bin": lambda path: scanned(5).tofile(path),
 }
 
 
@@ -153,6 +163,12 @@ def test_points_are_read_from_every_format(tmp_path, name):
     points = read_table(tmp_path / name)
     assert points.dtype == np.float64
     np.testing.assert_allclose(points, POINTS, atol=1e-6)
+
+
+def test_pandas_writes_nothing_for_nan(tmp_path):
+    (tmp_path / "cloud.csv").write_text("x,y,z,i\n1,2,3,\n,,,\n4,,6,1\n")
+    points = read_table(tmp_path / "cloud.csv")
+    np.testing.assert_array_equal(points, [[1, 2, 3], [np.nan] * 3, [4, np.nan, 6]])
 
 
 FAULTS = {
@@ -171,8 +187,14 @@ FAULTS = {
     "empty.csv": (lambda path: path.write_text("# nothing\n"), "has no points"),
     "head.csv": (lambda path: path.write_text("x,y,z\n"), "has no points"),
     "names.csv": (lambda path: path.write_text("lat,lon,height\n1,2,3\n"), "has the columns lat, lon, height, not x"),
-    "odd.bin": (lambda path: path.write_bytes(bytes(100)), "has 100 bytes, which are no rows of 4 float32"),
-    "other.bin": (lambda path: np.full(64, 0x7F7F7F7F, "<u4").tofile(path), "in meters, as scans of KITTI do"),
+    "odd.bin": (lambda path: path.write_bytes(bytes(101)), "does not hold rows of 4 or 5 float32: x, y, z in meters"),
+    "zeros.bin": (lambda path: path.write_bytes(bytes(160)), "does not hold rows of 4 or 5 float32"),
+    "other.bin": (lambda path: np.full(64, 0x7F7F7F7F, "<u4").tofile(path), "does not hold rows of 4 or 5 float32"),
+    "three.bin": (lambda path: scanned(3)[:68].tofile(path), "does not hold rows of 4 or 5 float32"),
+    "above.bin": (lambda path: (10 + scanned(3))[:68].tofile(path), "does not hold rows of 4 or 5 float32"),
+    "six.bin": (lambda path: scanned(6).tofile(path), "does not hold rows of 4 or 5 float32"),
+    "doubles.bin": (lambda path: POINTS.tofile(path), "does not hold rows of 4 or 5 float32"),
+    "kitti.pcd.bin": (lambda path: scanned(4).tofile(path), "does not hold rows of 5 float32"),
 }
 
 

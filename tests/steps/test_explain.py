@@ -23,8 +23,10 @@ FAULTS = [
     (
         untouched,
         {"--unit": "m"},
-        r"brick': its diameter is 128.5 m, so .* looks wrong; is it in millimeters. give --unit mm",
+        r"cone.ply: its diameter is .* m, but objects span 1 mm to 10 m; is it in millimeters. give --unit mm",
     ),
+    (untouched, {"--source-unit": "m"}, r"brick.stl: looks .* larger than the target; .* --source-unit mm --unit mm"),
+    (written("pairs.csv", "source\na.ply\n"), {"--pairs": "pairs.csv"}, r"--pairs: has sources and targets of its own"),
     (written("pose.txt", "1 0 0"), {"--init": "pose.txt"}, r"pose.txt: contains 3 numbers; give 4×4"),
     (untouched, {"--init": "pose.txt"}, r"pose.txt: no such file"),
     (untouched, {"--method": "icp"}, r"explain: registration method 'icp': unknown; choose one of point_to_point, "),
@@ -177,6 +179,78 @@ def test_several_sources_are_a_line_each(folder, capsys):
     assert {line["target"] for line in lines} == {"meshes/cone.ply"}
     assert all(set(line["diagnosis"]["causes"]) == {"noise", "pose", "overlap"} for line in lines)
     assert "meshes/brick.stl: source: 128 of 16384 points, drawn at random\n" in err
+
+
+PAIRS = """source, target, init, unit
+brick.stl,cone.ply,,mm
+lost.ply,cone.ply,,mm
+
+brick.stl,cone.ply,pose.txt,mm
+brick.stl,cone.ply,short.txt,mm
+brick.stl,cone.ply,,inch
+,cone.ply
+brick.stl,,,,more
+brick.stl,cone.ply
+"""
+
+
+def test_pairs_of_a_file_are_a_line_each_and_a_faulty_row_loses_no_other(folder, capsys):
+    meshes = folder / "meshes"
+    (meshes / "pairs.csv").write_text(PAIRS)
+    (meshes / "pose.txt").write_text("1 0 0 5  0 1 0 0  0 0 1 0")
+    (meshes / "short.txt").write_text("1 0 0")
+    words = ["explain", "--pairs", "meshes/pairs.csv", "--model", "model.pt", "--json-lines"]
+    assert main(words) == 2
+    out, err = capsys.readouterr()
+    lines = [json.loads(line) for line in out.splitlines()]
+    assert [(line["source"], line["target"]) for line in lines] == [("meshes/brick.stl", "meshes/cone.ply")] * 2
+    assert main([*arguments("explain", {"--init": "meshes/pose.txt"})]) == 0
+    assert json.loads(capsys.readouterr().out)["T_target_source"] == lines[1]["T_target_source"]
+    faults = [line for line in err.splitlines() if line.startswith("gpca explain: ")]
+    expected = (
+        (3, "meshes/lost.ply: no such file"),
+        (6, "meshes/short.txt: contains 3 numbers"),
+        (7, "unit 'inch': unknown; choose one of m, cm, mm"),
+        (8, "source: is missing; name a file"),
+        (9, "row: has more entries than columns"),
+        (10, "meshes/cone.ply: its diameter is"),
+    )
+    assert len(faults) == len(expected)
+    for fault, (number, words) in zip(faults, expected, strict=True):
+        assert fault.startswith(f"gpca explain: meshes/pairs.csv, line {number}: {words}")
+
+
+@pytest.mark.parametrize(
+    ("text", "words", "message"),
+    [
+        (None, ["--json-lines"], "pairs.csv: no such file"),
+        ("", ["--json-lines"], "pairs.csv: is empty"),
+        ("source,unit\na,b\n", ["--json-lines"], "pairs.csv: column 'target' is missing"),
+        ("source,target\n", ["--json-lines"], "pairs.csv: has no rows"),
+        ("source,target\na,b\n", [], "--pairs: prints one line for each pair; add --json-lines"),
+        ("source,target\na,b\n", ["--json-lines", "--init", "a"], "--init: is not for --pairs"),
+        ("source,target\na,b\n", ["--json-lines", "--html", "a"], "--html: is not for --pairs"),
+    ],
+)
+def test_a_file_without_pairs_is_one_line(folder, capsys, text, words, message):
+    if text is not None:
+        (folder / "pairs.csv").write_text(text)
+    assert main(["explain", "--pairs", "pairs.csv", "--model", "model.pt", *words]) == 2
+    out, err = capsys.readouterr()
+    assert not out
+    assert f"gpca explain: {message}" in err
+
+
+def test_source_and_target_may_have_units_of_their_own(folder, capsys):
+    import trimesh
+
+    assert main(arguments("explain", {})) == 0
+    expected = json.loads(capsys.readouterr().out)
+    trimesh.load(folder / "meshes/brick.stl").apply_scale(1e-3).export(folder / "meshes/brick.stl")
+    assert main(arguments("explain", {"--source-unit": "m"})) == 0
+    explanation = json.loads(capsys.readouterr().out)
+    np.testing.assert_allclose(explanation["T_target_source"], expected["T_target_source"], atol=1e-3)
+    assert explanation["unit"] == "mm"
 
 
 def test_an_option_without_a_value_swallows_no_file(folder, capsys):

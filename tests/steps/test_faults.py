@@ -51,7 +51,7 @@ FAULTS = {
         (untouched, settings("objects", location="nowhere"), "'mesh_folder': nowhere does not exist; correct"),
         (lambda folder: (folder / "empty").mkdir(), settings("objects", location="empty"), "the folder has none of"),
         (truncated("meshes/cone.ply"), {}, "cone.ply: is truncated or not a readable .ply file"),
-        (untouched, settings("objects", unit="m"), "object 'brick': its diameter is 128.5 m, so the declared unit"),
+        (untouched, settings("objects", unit="m"), "object 'brick': its diameter is 128.5 m, but objects span"),
         (untouched, {"--out": "meshes/brick.stl/objects.npz"}, "meshes/brick.stl"),
     ],
     "registrations": [
