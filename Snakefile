@@ -2,7 +2,8 @@
 import gc
 import sys
 
-gc.set_threshold(100_000)  # what a plan makes is kept: searching it for garbage is a seventh of its seconds
+# What a plan makes is kept: searching it for garbage takes a seventh of its time.
+gc.set_threshold(100_000)
 sys.path.insert(0, str(workflow.current_basedir))
 from gpca.config.check import read
 from gpca.config.jobs import clear_leftovers, export_to_jobs

@@ -55,6 +55,10 @@ class DGCNN(nn.Module):
         if x_B_N_F.device.type == "cpu" and not self.training and not wants_gradient:
             weights = {name: part.detach().numpy() for name, part in self.state_dict().items()}
             return torch.from_numpy(embed_clouds(weights, self.k, x_B_N_F.detach().contiguous().numpy(), sizes))
+        return self.by_layers(x_B_N_F, sizes)
+
+    def by_layers(self, x_B_N_F: torch.Tensor, sizes: Sequence[int] | None = None) -> torch.Tensor:
+        """Embed clouds (B, N, 3), or with `sizes` those in one row, by torch's layers."""
         batch, n, _ = x_B_N_F.shape
         features = []
         for edge_conv in self.edge_convs:
