@@ -99,6 +99,8 @@ class LabelFile:
         require_file(self.path, "no such file", remedy)
         with self.path.open(newline="", encoding="utf-8-sig", errors="replace") as file:
             head, *rows = [*filter(None, csv.reader(file))] or [[*LABEL_COLUMNS]]
+        if missing := [column for column in LABEL_COLUMNS if column not in head]:
+            raise InputError(self.path, f"column '{missing[0]}' is missing", remedy)
         if head != [*LABEL_COLUMNS]:
             raise InputError(self.path, f"has the columns {','.join(head)[:80]}", f"give {','.join(LABEL_COLUMNS)}")
         for line, row in enumerate(rows, start=2):

@@ -62,11 +62,14 @@ class Mean(NamedTuple):
     unit: float = 0.0  # its change when all samples change: 1 for a share, 100 in percent, 0 if neither
 
 
+OF_KINDS = Keys({kind: NotNegative for *_, kind in KINDS}, required=[kind for *_, kind in KINDS])
+
+
 @dataclass(frozen=True)
 class Allowance:
     """The largest difference allowed between two means: section ``reference`` of the config."""
 
-    tolerances: Annotated[dict, Keys({kind: NotNegative for *_, kind in KINDS}, required=[kind for *_, kind in KINDS])]
+    tolerances: Annotated[dict, OF_KINDS]
     half_widths: NotNegative  # multiple of those of the reference's 95 % intervals, for all but shares of samples
     flipped: Share  # share of the samples that another rounding may decide otherwise
     deviations: NotNegative  # number of standard deviations of the balance of flipped samples

@@ -158,7 +158,8 @@ def _normalized(x_P_F: np.ndarray, weights: Mapping[str, np.ndarray], norm: str)
 
 def _squares(x_P_F: np.ndarray) -> np.ndarray:
     """Return |x|² (…), added in the order of torch's vectors of eight numbers, four at a time."""
-    squares_P_F = x_P_F * x_P_F
+    with np.errstate(over="ignore"):  # as in a product
+        squares_P_F = x_P_F * x_P_F
     lanes = 8 if squares_P_F.shape[-1] >= 8 else 1
     count = squares_P_F.shape[-1] // lanes
     columns = [squares_P_F[..., lanes * i : lanes * (i + 1)] for i in range(count)]
