@@ -107,9 +107,10 @@ def run_explain(options: Namespace) -> int:
     else:
         from gpca.model.explainer import Explainer
         from gpca.model.file import Model
-        from gpca.model.tolerance import DEFAULT
+        from gpca.model.tolerance import DEFAULT, Tolerance
         from gpca.uncertainty.settings import MONTE_CARLO, UncertaintySettings
 
+        tolerance = Tolerance.parse(options.tolerance) if options.tolerance else DEFAULT
         model = Model.load(path)
         explainer, learned = Explainer(model), f"model {path}: {model.learning}"
         names["model"] = str(path)
@@ -121,7 +122,7 @@ def run_explain(options: Namespace) -> int:
             method=options.method,
             fast=options.fast,
             register=options.pose is None,
-            tolerance=options.tolerance or DEFAULT,
+            tolerance=tolerance,
         )
     statuses = {0}
 

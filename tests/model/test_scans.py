@@ -68,6 +68,17 @@ def test_a_right_registration_is_told_from_a_wrong_one(scans, right):
         assert words in wrong.text()
 
 
+def test_a_pose_in_text_is_that_in_json_at_utm_coordinates(scans):
+    """Six significant digits were more than a meter off there."""
+    offset = np.array([539_719.0, 4_065_740.0, 0.0])
+    source, target = (cloud + offset for cloud in scans)
+    explanation = explain_scans(source, target)
+    rows = explanation.text().partition("T_target_source, in m\n")[2].splitlines()[:4]
+    printed = np.array([row.split() for row in rows], float)
+    moved = [transform(np.array(T), source) for T in (printed, explanation.as_dict()["T_target_source"])]
+    assert np.abs(moved[0] - moved[1]).max() < 1e-5
+
+
 def test_a_source_far_from_the_target_has_failed(scans):
     source, target = scans
     far = explain_scans(source, target + np.array([0, 5000, 0]))
