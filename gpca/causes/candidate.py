@@ -11,10 +11,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from time import perf_counter
+from typing import Protocol
 
 import numpy as np
 
 from gpca.alignment.batched_icp import BatchedICP
+from gpca.alignment.icp import ICPSettings
 from gpca.causes.dataset import Causes
 from gpca.causes.settings import FEWEST_POINTS, OBSERVED, CauseSettings
 from gpca.causes.truth import NONE, SUBSETS, capped
@@ -28,6 +30,13 @@ from gpca.uncertainty.spread import Runs, divergence
 
 REPRODUCED = 1e-3  # diameters; points that are drawn again lie no farther from those of a file, which are rounded
 CAUSE_OF = {"noise": NOISE, "outliers": NOISE, "rotation_rad": POSE, "translation": POSE, "crop": OVERLAP}
+
+
+class MovingICP(Protocol):
+    """ICP to one target from many poses, such as :class:`BatchedICP`."""
+
+    def register(self, source: np.ndarray, T_n: np.ndarray, /) -> tuple[np.ndarray, ...]:
+        """Align points (N, 3) from poses (n, 4, 4): poses, fitness (n,), inlier RMSE (n,)."""
 
 
 def draw_applied(settings: CauseSettings, random: np.random.Generator) -> np.ndarray:
@@ -68,6 +77,10 @@ class Candidate:
     def changing_reference(self, causes: tuple[int, ...]) -> tuple[int, ...]:
         """Return those of the causes that change :meth:`reference`: where they are the same, so are its points."""
         return () if self.model_at_truth is None else tuple(cause for cause in causes if cause == POSE)
+
+    def icp(self, target: np.ndarray, causes: tuple[int, ...], settings: ICPSettings) -> MovingICP:
+        """Return the ICP to a target, which has these of the applied causes."""
+        return BatchedICP(target, settings)
 
     def start(self, causes: tuple[int, ...]) -> np.ndarray:
         """Return where a registration with these of the applied causes starts."""
@@ -140,7 +153,7 @@ class Registrar:
     candidate: Candidate
     settings: CauseSettings
     misses: bool = False
-    _targets: dict[tuple[int, ...], BatchedICP] = field(default_factory=dict)  # by the causes that change them
+    _targets: dict[tuple[int, ...], MovingICP] = field(default_factory=dict)  # by the causes that change them
 
     def run(self, causes: tuple[int, ...], xi_n_6: np.ndarray) -> Runs:
         """Register with these causes from the starts exp(ξ) T_init; may raise Unmeasurable.
@@ -157,7 +170,7 @@ class Registrar:
             moving, target, alike = model, observed, tuple(cause for cause in causes if cause != POSE)
             starts_n = inverses(starts_n)
         if alike not in self._targets:
-            self._targets[alike] = BatchedICP(target, self.settings.icp)
+            self._targets[alike] = self.candidate.icp(target, alike, self.settings.icp)
         poses_n, fitness_n, rmse_n = self._targets[alike].register(moving, starts_n)
         if self.settings.moved != OBSERVED:
             poses_n = inverses(poses_n)

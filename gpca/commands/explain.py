@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 FAULTY_STATUS, UNKNOWN_STATUS = 2, 3  # exit codes; 1 is a failed check
 FORMATS = "PLY, PCD, OBJ, STL, OFF, VTK, glb, npy, npz, xyz, txt, asc, pts, csv, bin of KITTI or nuScenes, LAS, E57"
 FIGURE = "gpca.model.explanation_figure"  # by name: only this needs matplotlib
-OBJECT_OPTIONS = ("model", "fast", "uncertainty", "estimator", "queue", "png")  # they need a model of objects
+OBJECT_OPTIONS = ("model", "fast", "queue", "png")  # they need a model of objects
 FOR_ONE = ("init", "pose", "save_pose", "html", "png")  # options that do not go with many pairs
 
 
@@ -103,7 +103,14 @@ def run_explain(options: Namespace) -> int:
     if path is None:
         from gpca.model.scan_explainer import explain_scans
 
-        explain = partial(explain_scans, voxel=options.voxel, method=options.method)
+        explain = partial(
+            explain_scans,
+            voxel=options.voxel,
+            method=options.method,
+            limit=None if options.tolerance is None else _length(options.tolerance, options.unit),
+            T_target_source=None if options.pose is None else read_pose(options.pose),
+            estimator=options.estimator or ("monte_carlo" if options.uncertainty else None),
+        )
     else:
         from gpca.model.explainer import Explainer
         from gpca.model.file import Model
@@ -156,6 +163,16 @@ def _with_progress(rows: list[tuple[str, dict[str, str]]]) -> Iterable[tuple[str
     from gpca.process.progress import progress
 
     return progress(rows, "explaining", unit=" pairs")
+
+
+def _length(text: str, unit: str) -> float:
+    """Return the tolerance of scans in the unit of the points; they have no diameter for a share or an angle."""
+    from gpca.model.tolerance import Tolerance
+
+    tolerance = Tolerance.parse(text)
+    if tolerance.unit not in METERS_PER_UNIT:
+        raise InputError("--tolerance", f"'{text}' is no length, and scans have no diameter", "give one such as 0.2m")
+    return tolerance.value * METERS_PER_UNIT[tolerance.unit] / METERS_PER_UNIT[unit]
 
 
 def _require_options(options: Namespace) -> None:

@@ -1,4 +1,4 @@
-"""Explanations of one registration, of objects by a trained model or of scans without training."""
+"""Explanations of one registration, of objects by a trained model or of scans without one."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from gpca.rigid import as_rows, log
 NOT_SURE = "not sure"
 GIVEN = "given"  # method of a pose that was not registered but judged
 LEARNED = (
-    "nothing was learned from scans: this is the untrained re-enactment, and the model, which learned from objects, "
-    "is not used"
+    "the probability of a failure was fitted to scans of development scenes (docs/scans.md); the model, which learned "
+    "from objects, is not used"
 )
 HEADS = {  # CSS class and title of a state
     NOMINAL: ("good", "Nothing speaks against this registration"),
@@ -68,6 +68,17 @@ class PoseSpread:
         """Root mean square length, in the unit of the points."""
         return self.diameter * math.sqrt(np.trace(self.covariance_6_6[3:, 3:]))
 
+    def line(self, unit: str) -> str:
+        """One line of text."""
+        scatter = f"{self.rotation_deg:.2f}°, {in_decimals(self.translation, 4)} {unit}"
+        by = f"over {self.starts} starts" if self.starts else f"by {self.estimator}"
+        return f"pose spread    {scatter} (root mean square {by})"
+
+    def as_dict(self) -> dict[str, object]:
+        """Values for JSON."""
+        numbers = {name: getattr(self, name) for name in ("rotation_deg", "translation", "estimator", "starts")}
+        return numbers | {"covariance": self.covariance_6_6.tolist()}
+
 
 @dataclass(frozen=True, kw_only=True)
 class ExplainedRegistration:
@@ -82,6 +93,7 @@ class ExplainedRegistration:
     action: str  # what to do next: a branch of the policy (:mod:`gpca.causes.policy`), or `CHECK`
     reason: str  # reason for this action
     unit: str  # unit of all lengths
+    spread: PoseSpread | None = None  # uncertainty of the pose by an estimator, if requested and available
     moved: Motion | None = None  # from the initial pose, if one was given and registered from
     notes: tuple[str, ...] = ()  # changes made to the clouds, such as points that were left out
     warnings: tuple[str, ...] = ()  # reasons to doubt the explanation
@@ -98,7 +110,7 @@ class ExplainedRegistration:
         """Values for JSON."""
         values = asdict(replace(self, scene=None), dict_factory=plain)
         del values["scene"]
-        return values
+        return values | {"spread": self.spread and self.spread.as_dict()}
 
     @property
     def fitting_pose(self) -> np.ndarray:
@@ -164,7 +176,6 @@ class Explanation(ExplainedRegistration):
     bald: float
     entropy: float
     concept: str  # concept with the largest score (Eq. 6).
-    spread: PoseSpread | None  # uncertainty of the pose by an estimator, if requested and available
     seconds: dict[str, float]  # duration of each stage, and ``total``
 
     @property
@@ -179,12 +190,7 @@ class Explanation(ExplainedRegistration):
 
     def as_dict(self) -> dict[str, object]:
         """Values for JSON."""
-        values = super().as_dict() | {"diagnosis": self.diagnosis and self.diagnosis.as_dict()}
-        if self.spread:
-            names = ("rotation_deg", "translation", "estimator", "starts")
-            numbers = {name: getattr(self.spread, name) for name in names}
-            values["spread"] = numbers | {"covariance": self.spread.covariance_6_6.tolist()}
-        return values
+        return super().as_dict() | {"diagnosis": self.diagnosis and self.diagnosis.as_dict()}
 
     def html(self, names: Mapping[str, str] | None = None) -> str:
         """Return a page that needs no other file: both clouds in 3-D, causes, poses, counterfactuals."""
@@ -224,16 +230,23 @@ class Explanation(ExplainedRegistration):
             ]
         lines = [f"fitness {self.fitness:.3f}, inlier RMSE {in_decimals(self.inlier_rmse, 4)} {self.unit}"]
         if self.spread is not None:
-            scatter = f"{self.spread.rotation_deg:.2f}°, {in_decimals(self.spread.translation, 4)} {self.unit}"
-            by = f"over {self.spread.starts} starts" if self.spread.starts else f"by {self.spread.estimator}"
-            lines.append(f"pose spread    {scatter} (root mean square {by})")
+            lines.append(self.spread.line(self.unit))
         stages = ", ".join(f"{stage} {1e3 * seconds:.1f}" for stage, seconds in self.seconds.items())
         return self._report(body, "\n".join(lines), "", f"milliseconds   {stages}")
 
 
+@dataclass(frozen=True)
+class Evidence:
+    """What speaks for a failure of a result between scans."""
+
+    elsewhere: float  # probability of an error above the limit, over the poses that may be true
+    apart: float  # root mean square distance between partners at the result, voxels
+    overlap: float  # share of the source with a partner
+
+
 @dataclass(frozen=True, kw_only=True)
 class ScanExplanation(ExplainedRegistration):
-    """One registration of two partial scans of a scene, explained without training.
+    """One registration of two partial scans of a scene, explained without a model.
 
     Attributes:
         fitness, inlier_rmse: share of the source's voxels with a partner within two voxels; their RMSE.
@@ -242,9 +255,11 @@ class ScanExplanation(ExplainedRegistration):
 
     voxel: float  # edge length of the voxels
     state: str  # ``nominal``, ``failed`` or ``not sure``
-    failure: float  # probability of a failure (:func:`gpca.model.scan_explainer.failure_of`), not calibrated
+    failure: float  # probability of a failure (:func:`gpca.model.scan_explainer.failure_of`)
+    evidence: Evidence  # what it was computed from
     limit: float  # error above which a registration counts as failed: root mean square over the common surface
     overlap: tuple[float, float]
+    causes: tuple[str, ...]  # those that add a third of the limit to the error, the largest first; none if nominal
     reenacted: Reenacted  # hypotheses of the true pose, and the effect of each cause
     seconds: float  # duration
     learned_from: str = LEARNED  # training data: none
@@ -259,29 +274,38 @@ class ScanExplanation(ExplainedRegistration):
         rmse, voxel, limit = (page.length(value, self.unit) for value in (self.inlier_rmse, self.voxel, self.limit))
         body = [
             f"state     {self.state}",
-            f"failure   probability {self.failure:.2f}, not calibrated, of an error above {limit}",
+            f"failure   probability {self.failure:.2f} of an error above {limit}",
+            f"causes    {self._named()}",
             f"overlap   {self._overlap()}",
             self.reenacted.effects_line(self.unit),
             *self.reenacted.pose_lines("the source", self.unit),
             f"action    {self.advice} ({self.reason})",
         ]
-        return self._report(body, f"fitness {self.fitness:.3f}, inlier RMSE {rmse}, voxels of {voxel}")
+        lines = [f"fitness {self.fitness:.3f}, inlier RMSE {rmse}, voxels of {voxel}"]
+        if self.spread is not None:
+            lines.append(self.spread.line(self.unit))
+        return self._report(body, "\n".join(lines))
 
     def html(self, names: Mapping[str, str] | None = None) -> str:
         """Return a page that needs no other file, as :meth:`Explanation.html` does."""
         tone, title = HEADS[self.state]
-        doubt = f"Probability of failure {self.failure:.2f}, not calibrated: {self.learned_from}."
+        limit = page.length(self.limit, self.unit)
+        doubt = f"Probability of an error above {limit}: {self.failure:.2f}. Here {self.learned_from}."
         scene, explained = self.scene, self.as_dict()
         inputs = {"training": self.learned_from, "voxels": page.length(self.voxel, self.unit)} | dict(names or {})
         body = [
             page.action(explained, self.advice),
             page.section("Overlap", f"<p>{escape(self._overlap())}.</p>"),
+            page.section("Causes", f"<p>{escape(self._named())}.</p>") if self.causes else "",
             page.poses(self.reenacted, "the source", self.unit),
-            page.counterfactuals(scene, self.unit, SCANS_WITHOUT) if scene else "",
+            page.counterfactuals(scene, self.unit, SCANS_WITHOUT, "errors from this one start") if scene else "",
             page.details(explained, inputs, self.pose_rows(self.T_target_source)),
         ]
         head = f'<h1 class="{tone}">{title}</h1><p>{escape(doubt)}</p>{page.warnings(self.warnings)}'
         return page.assembled("Scans explained", head, body, scene, self.unit)
+
+    def _named(self) -> str:
+        return " and ".join(self.causes) or "none is named"
 
     def _overlap(self) -> str:
         source, target = self.overlap

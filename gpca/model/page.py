@@ -133,10 +133,12 @@ def poses(reenacted: Reenacted, subject: str, unit: str, *, observation: bool = 
     return section("Poses that fit", f'<ol class="poses">{items}</ol>{note if observation else ""}')
 
 
-def counterfactuals(scene: Scene, unit: str, without: Mapping[str, str] = WITHOUT) -> str:
+def counterfactuals(
+    scene: Scene, unit: str, without: Mapping[str, str] = WITHOUT, bars: str = "mean errors over starts around it"
+) -> str:
     """Draw the eight re-enacted registrations under each hypothesis, each as a button that shows its cloud.
 
-    `without` says what removing each cause means.
+    `without` says what removing each cause means, `bars` which errors are drawn.
     """
     if not scene.possibilities:
         return ""
@@ -156,7 +158,7 @@ def counterfactuals(scene: Scene, unit: str, without: Mapping[str, str] = WITHOU
         groups.append(f'<div class="what-ifs" data-hypothesis="{k}">{"".join(reversed(rows))}</div>')
     note = (
         f'The registration was run again as if pose <span id="hypothesis">1</span> were true, with causes taken out. '
-        f"Bars are mean errors over starts around it; the line is the limit of a failure, {length(limit, unit)}. "
+        f"Bars are {bars}; the line is the limit of a failure, {length(limit, unit)}. "
         "Choose a row to see its cloud, from the start itself."
     )
     return section("What if?", f'<p class="note">{note}</p>{"".join(groups)}')

@@ -1,10 +1,9 @@
-"""Explains the registration of two scans of any size without training.
+"""Explains the registration of two scans of any size without a model.
 
-Both clouds are partial, so classifiers trained on whole objects do not apply. The probability of a failure is the mean
-of two. The first compares the result with the hypotheses of the true pose, each refined on all voxels and weighted by
-its fit. The second is the distance between partners at the result: two samples of one surface, one point per voxel, lie
-about 0.6 voxels apart; surfaces that only cross, about 1.1. The mean ranked failures better than either on the
-development scenes of 3DMatch, on which the constants were chosen.
+Both clouds are partial, so classifiers trained on whole objects do not apply. The probability of a failure is a
+logistic regression on two numbers, fitted to development scenes (docs/scans.md). The first is the weight, by their fit,
+of the poses that are farther from the result than the limit. The second is the distance between partners at the result:
+two samples of one surface, one point per voxel, lie about 0.6 voxels apart; surfaces that only cross, about 1.1.
 """
 
 from __future__ import annotations
@@ -19,35 +18,32 @@ from scipy.special import expit
 
 from gpca.alignment.pose_error import displacements
 from gpca.causes.policy import NOTHING, TREATMENTS
-from gpca.causes.settings import OBSERVED, CauseSettings
 from gpca.causes.truth import FAILED, NOMINAL
 from gpca.errors import InputError
-from gpca.model.diagnosis import CHECK, Reenacted
-from gpca.model.explanation import NOT_SURE, ScanExplanation
-from gpca.model.scan_registration import Scans, in_voxels, voxel_size
+from gpca.model.diagnosis import CHECK, RERUN, Reenacted
+from gpca.model.explanation import GIVEN, NOT_SURE, Evidence, Motion, PoseSpread, ScanExplanation
+from gpca.model.scan_registration import TRUTH, PossiblePose, Scans, in_voxels, voxel_size
 from gpca.model.scene import Scene
 from gpca.numerals import in_decimals
 from gpca.objects.canonical import CanonicalFrame, diameter, require_cloud_points
 from gpca.objects.surface import as_points, in_unit, meters_per
-from gpca.pairs.distances import ObservedPair
 from gpca.reenactment.enactment import Enactment
-from gpca.reenactment.hypotheses import INDEPENDENT, weights_of
-from gpca.reenactment.scans import reenact_scan
-from gpca.reenactment.settings import STEEPNESS, ReenactmentSettings
-from gpca.reenactment.surface import ModelSurface
+from gpca.reenactment.hypotheses import weights_of
+from gpca.reenactment.settings import STEEPNESS
 from gpca.rigid import inverse, require_rigid, transform
 
 OUTSIDE = 0.01  # share of the target's points on either side that its extent ignores
 FEWEST_VOXELS = 64
-ICP = "point_to_plane, coarse to fine"
 SHOWN_REACH = 5.0  # voxels, up to which distances are colored
-LIMIT = 0.05  # error above which a registration has failed, in extents of the target: 0.2 m of 4 m, as in rooms
-CLOSE = 0.8  # distance between partners with an even chance of failure, root mean square, voxels
-CLOSE_STEEPNESS = 16.0  # of the probability in the logarithm of this distance
+# The default limit of an error: at least that of rooms and of what voxels resolve, at most a share of the extent.
+LIMIT_M, LIMIT_VOXELS, LIMIT_SHARE = 0.2, 2.0, 0.05
+# Of the log odds of a failure, by `benchmarks/scan_judgment.py`: of what is elsewhere, of log(apart), and the constant.
+OF_ELSEWHERE, OF_LOG_APART, LOG_ODDS = 5.4, 4.2, -2.0
 GOOD, BAD = 0.2, 0.5  # probability of a failure below which the state is nominal, and from which it is failed
 LEAST_OVERLAP = 0.2  # share of the source below which a wrong pose fits as well as the right one
-TRUTH = CauseSettings(moved=OBSERVED)  # of re-enactments
+OWN_ERROR = 0.3  # voxels, of a pose that fits
 LEAST = 1e-6  # lower bound of arguments of logarithms
+ADDS = 1 / 3  # of the limit, that a cause adds at least to the error: as in the diagnosis of objects
 
 
 def explain_scans(
@@ -58,53 +54,85 @@ def explain_scans(
     voxel: float | None = None,
     method: str | None = None,
     source_unit: str | None = None,
+    limit: float | None = None,
+    T_target_source: np.ndarray | None = None,
+    estimator: str | None = None,
 ) -> ScanExplanation:
     """Register a scan to a scan, and judge whether that may have failed. The same clouds give the same numbers.
 
     Args:
         source_points, target_points: (N, 3) arrays, or Open3D clouds, of any extent.
         T_target_source_init: (4, 4) initial pose; by default, the identity.
-        unit: unit of points, pose, voxel and results: ``m``, ``cm`` or ``mm``.
+        unit: unit of points, poses, voxel and limit: ``m``, ``cm`` or ``mm``.
         voxel: edge length of the voxels to which both are thinned; by default, chosen from the point spacing.
-        method: registration method (docs/registration.md); by default, point-to-plane ICP, coarse to fine.
+        method: registration method (docs/registration.md); by default, ICP: point-to-plane, or point-to-point if a
+            scan is flat.
+        limit: error above which the result is wrong, root mean square over the common surface; by default, 0.2 m or
+            two voxels, whichever is more, but at most 5 % of the target's extent.
+        T_target_source: (4, 4) pose to be judged; nothing is registered then. It is the initial pose, too, by default.
         source_unit: unit of the source's points, if another one; they are converted first.
+        estimator: uncertainty estimator (docs/estimators.md) that needs no training registrations; None skips it.
 
     Raises:
-        InputError: too few points with a measurement, points on one line, an initial pose that is not rigid, voxels
-            that leave too few points, unknown method or missing package.
+        InputError: too few points with a measurement, points on one line, a pose that is not rigid, voxels that leave
+            too few points, a limit that is no length, unknown method or estimator, or missing package.
     """
     started = perf_counter()
-    meters_per(unit)
-    T_init = np.eye(4) if T_target_source_init is None else np.array(T_target_source_init, np.float64)
+    T_given = None if T_target_source is None else np.array(T_target_source, np.float64)
+    T_init = T_target_source_init if T_target_source_init is not None or T_given is None else T_given
+    T_init = np.eye(4) if T_init is None else np.array(T_init, np.float64)
     require_rigid(T_init, "initial pose")
     notes: list[str] = []
     source = in_unit(as_points(source_points, "source", notes), source_unit, unit)
     clouds = {"source": source, "target": as_points(target_points, "target", notes)}
     scans, frame = _prepared(clouds, T_init, unit, voxel, notes)
-    outcome = scans.registered() if method is None else scans.registered_by(method)
+    if limit is None:
+        most = max(LIMIT_M / meters_per(unit), LIMIT_VOXELS * scans.voxel * frame.diameter)
+        limit = min(most, LIMIT_SHARE * frame.diameter)
+    if not 0 < limit < np.inf:
+        raise InputError("limit", f"{limit:g} is no length", "give a positive one")
+    if T_given is not None:
+        require_rigid(T_given, "pose")
+        outcome = scans.outcome(frame.pose_inside(T_given @ inverse(T_init)))
+    else:
+        outcome = scans.registered() if method is None else scans.registered_by(method)
     if outcome.failure:
         notes.append(f"{method} failed: {outcome.failure}")
-    T_found = outcome.T_target_source
-    pair = scans.pair(T_found)
-    enactments = _enacted(scans, pair)
-    weight_k = weights_of(enactment.hypothesis for enactment in enactments)
-    reenacted = Reenacted.of(enactments, weight_k, T_found, ModelSurface(pair.model)).outside(frame, T_init)
-    failure, overlap = failure_of(scans, enactments, T_found), scans.overlap(T_found)
-    fine = failure < GOOD and overlap[0] >= LEAST_OVERLAP
-    state = FAILED if failure >= BAD else NOMINAL if fine else NOT_SURE
-    action, reason = decision(state, reenacted, overlap[0])
+    T_found, tolerance = outcome.T_target_source, limit / frame.diameter
+    ranked = scans.poses(T_found, min(scans.voxel, tolerance / 2))
+    enactments = [scans.enacted(pose, T_found) for pose in ranked]
+    reenacted = _reenacted(scans, enactments, T_found).outside(frame, T_init)
+    evidence, overlap = evidence_at(scans, ranked, T_found, tolerance), scans.overlap(T_found)
+    failure = failure_of(evidence)
+    state = state_of(failure, overlap[0])
+    causes = () if state == NOMINAL else causes_of(reenacted, limit)
+    action, reason = decision(state, reenacted, overlap[0], causes)
     warning = f"only {overlap[0]:.0%} of the source lies on the target: wrong poses may fit as well as the right one"
+    moved, spread = None, None
+    if T_given is None and T_target_source_init is not None:
+        moved = Motion.of(T_found, scans.source, frame.diameter)
+    if estimator is not None:
+        by = method or ("point_to_point" if scans.flat else "point_to_plane")
+        estimated = scans.estimated(estimator, outcome, by)
+        if estimated.covariance_6_6 is None:
+            notes.append(f"{estimator} gives no covariance: {estimated.failure}")
+        else:
+            spread = PoseSpread(estimated.covariance_6_6, frame.diameter, estimator, None)
     return ScanExplanation(
         T_target_source=frame.pose_outside(T_found) @ T_init,
         fitness=outcome.fitness,
         inlier_rmse=outcome.inlier_rmse * frame.diameter,
-        method=method or ICP,
+        method=GIVEN if T_given is not None else method or scans.icp_name,
         voxel=scans.voxel * frame.diameter,
         state=state,
         failure=failure,
-        limit=LIMIT * frame.diameter,
+        evidence=evidence,
+        limit=limit,
         overlap=overlap,
+        causes=causes,
         reenacted=reenacted,
+        spread=spread,
+        moved=moved,
         action=action,
         reason=reason,
         unit=unit,
@@ -112,17 +140,26 @@ def explain_scans(
         notes=tuple(notes),
         warnings=(warning,) if overlap[0] < LEAST_OVERLAP else (),
         scene=Scene(
-            *(scans.source, scans.target, T_found, frame, SHOWN_REACH * scans.voxel, LIMIT),
+            *(scans.source, scans.target, T_found, frame, SHOWN_REACH * scans.voxel, tolerance),
             enactments=enactments,
             truth=TRUTH,
         ),
     )
 
 
+def _reenacted(scans: Scans, enactments: Sequence[Enactment], T_found: np.ndarray) -> Reenacted:
+    """Summarize re-enactments; one pose is the result."""
+    weight_k = weights_of(enactment.hypothesis for enactment in enactments)
+    reenacted = Reenacted.of(enactments, weight_k, T_found, scans.coarse)
+    poses = (replace(pose, registered=pose.T_target_source is T_found) for pose in reenacted.poses)
+    return replace(reenacted, poses=tuple(poses))
+
+
 def _prepared(
     clouds: dict[str, np.ndarray], T_init: np.ndarray, unit: str, voxel: float | None, notes: list[str]
 ) -> tuple[Scans, CanonicalFrame]:
     """Thin both scans to voxels; return them with the frame of the target."""
+    meters_per(unit)
     for name, points in clouds.items():
         require_cloud_points(points, name)
     if voxel is None:
@@ -140,51 +177,55 @@ def _prepared(
     low, high = np.quantile(clouds["target"], (OUTSIDE, 1 - OUTSIDE), axis=0)
     frame = CanonicalFrame((low + high) / 2, float(np.sqrt(np.square(high - low).sum())))
     source = frame.coordinates(transform(T_init, clouds["source"]))
-    return Scans(source, frame.coordinates(clouds["target"]), voxel / frame.diameter), frame
+    scans = Scans(source, frame.coordinates(clouds["target"]), voxel / frame.diameter)
+    if scans.flat:
+        notes.append("the scans are flat: point-to-plane cannot move them, so they are registered point-to-point")
+    return scans, frame
 
 
-def _enacted(scans: Scans, pair: ObservedPair) -> list[Enactment]:
-    """Re-enact a pair, with hypotheses refined on all voxels and weighted by their fit, the best first."""
-    enactments = reenact_scan(pair, 1.0, ReenactmentSettings(), TRUTH)
-    T_k = scans.refined(np.stack([enactment.hypothesis.T for enactment in enactments]))
-    refined = [
-        replace(enactment, hypothesis=replace(enactment.hypothesis, T=T, log_posterior=-INDEPENDENT * scans.misfit(T)))
-        for enactment, T in zip(enactments, T_k, strict=True)
-    ]
-    return sorted(refined, key=lambda enactment: -enactment.hypothesis.log_posterior)
-
-
-def failure_of(scans: Scans, enactments: Sequence[Enactment], T_found: np.ndarray) -> float:
-    """Return the probability of an error above the limit, over the surface that is common at each hypothesis."""
+def evidence_at(scans: Scans, poses: Sequence[PossiblePose], T_found: np.ndarray, limit: float) -> Evidence:
+    """Gather what speaks for a failure of a result, with a limit in units of the extent."""
     at_result = scans.outcome(T_found)
-    if not at_result.fitness > 0:
+    weight_k = np.exp([pose.log_posterior - max(each.log_posterior for each in poses) for pose in poses])
+    error_k = [displacements((T_found @ inverse(pose.T))[None], scans.common(pose.T))[0] for pose in poses]
+    log_error_k = np.log(np.hypot(error_k, OWN_ERROR * scans.voxel) / limit)
+    elsewhere = (weight_k * expit(STEEPNESS * log_error_k)).sum() / weight_k.sum()
+    return Evidence(float(elsewhere), at_result.inlier_rmse / scans.voxel, at_result.fitness)
+
+
+def failure_of(evidence: Evidence) -> float:
+    """Return the probability of an error above the limit."""
+    if not evidence.overlap > 0:
         return 1.0
-    errors = [0.0]
-    for enactment in enactments:
-        candidate, T = enactment.candidate, enactment.hypothesis.T
-        # The candidate lies where the hypothesis was before its refinement.
-        common = transform(T @ candidate.T_init, candidate.noisy[candidate.seen])
-        errors.append(float(displacements((T_found @ inverse(T))[None], common)[0]))
-    posteriors = (enactment.hypothesis.log_posterior for enactment in enactments)
-    posterior_k = np.array([-INDEPENDENT * scans.misfit(T_found), *posteriors])
-    weight_k = np.exp(posterior_k - posterior_k.max())
-    log_error_k = np.log(np.maximum(np.array(errors), LEAST) / LIMIT)
-    by_poses = (weight_k * expit(STEEPNESS * log_error_k)).sum() / weight_k.sum()
-    by_fit = expit(CLOSE_STEEPNESS * np.log(max(at_result.inlier_rmse / scans.voxel, LEAST) / CLOSE))
-    return float(by_poses + by_fit) / 2
+    log_apart = np.log(max(evidence.apart, LEAST))
+    return float(expit(OF_ELSEWHERE * evidence.elsewhere + OF_LOG_APART * log_apart + LOG_ODDS))
 
 
-def decision(state: str, reenacted: Reenacted, overlap: float) -> tuple[str, str]:
+def state_of(failure: float, overlap: float) -> str:
+    """Return the state: where little lies on the target, a wrong pose fits as well as the right one."""
+    if 0 < overlap < LEAST_OVERLAP:
+        return NOT_SURE
+    return FAILED if failure >= BAD else NOMINAL if failure < GOOD else NOT_SURE
+
+
+def causes_of(reenacted: Reenacted, limit: float) -> tuple[str, ...]:
+    """Return the causes that add a third of the limit to the error, the largest first."""
+    ranked = sorted(reenacted.effects, key=lambda name: -reenacted.effects[name])
+    return tuple(name for name in ranked if reenacted.effects[name] >= ADDS * limit)
+
+
+def decision(state: str, reenacted: Reenacted, overlap: float, causes: Sequence[str]) -> tuple[str, str]:
     """Return what to do next, and why."""
     if state == NOMINAL:
         return NOTHING, "the scans lie close to each other, and no other pose fits as well"
     if overlap == 0:
         return TREATMENTS["pose"], "no point of the source lies on the target: give an initial pose or a global method"
+    if causes and causes[0] == "overlap":
+        return TREATMENTS["overlap"], "on their common parts alone, the scans would have been registered better"
     if not reenacted.poses[0].registered:
-        return TREATMENTS["pose"], "another pose may be right: start from pose 1"
+        return RERUN, "another pose fits better; --save-pose writes it"
     if overlap < LEAST_OVERLAP:
         return TREATMENTS["overlap"], f"only {overlap:.0%} of the source lies on the target"
-    if state == NOT_SURE:
+    if state == NOT_SURE or not causes:
         return CHECK, "another pose fits nearly as well, or the scans do not lie close to each other"
-    cause = max(reenacted.effects, key=lambda name: reenacted.effects[name])
-    return TREATMENTS[cause], f"{cause} adds most to the re-enacted error"
+    return TREATMENTS[causes[0]], f"{causes[0]} adds most to the re-enacted error"

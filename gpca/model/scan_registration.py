@@ -3,37 +3,57 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gpca.alignment.batched_icp import BatchedPlaneICP
+from gpca.alignment.batched_icp import BatchedICP, BatchedPlaneICP
 from gpca.alignment.features import estimate_normals
 from gpca.alignment.icp import ICPSettings, clipped_cost
 from gpca.alignment.methods.interface import Outcome, Pair
 from gpca.alignment.methods.registry import make_method
+from gpca.alignment.pose_error import displacements
+from gpca.causes.candidate import Registrar
+from gpca.causes.scans import OverlapErrors, ScanCandidate
+from gpca.causes.settings import FEWEST_POINTS, OBSERVED, CauseSettings
+from gpca.causes.truth import SUBSETS, capped
 from gpca.errors import InputError
 from gpca.numerals import in_decimals
 from gpca.objects.canonical import thin
-from gpca.pairs.distances import ObservedPair
-from gpca.rigid import exp, inverse, scale_translation, transform
+from gpca.pairs.distances import dots
+from gpca.pairs.perturbation import OVERLAP
+from gpca.reenactment.enactment import Enactment, NoiseScale
+from gpca.reenactment.hypotheses import INDEPENDENT, NEGLIGIBLE, Hypothesis, find_hypotheses
+from gpca.reenactment.scans import cropped
+from gpca.reenactment.settings import ReenactmentSettings
+from gpca.reenactment.surface import ModelSurface
+from gpca.rigid import exp, inverse, inverses, rotate, scale_translation, transform
 from gpca.scans.pair import MOST_CELLS, voxels
 from gpca.seeds import generator, seed_of
-from gpca.uncertainty.settings import start_deviation
+from gpca.uncertainty.estimators.interface import CovarianceEstimate, RegisteredPair
+from gpca.uncertainty.estimators.registry import make_estimator
+from gpca.uncertainty.settings import MONTE_CARLO, UncertaintySettings, start_deviation
 
 SPACINGS = 2.0  # least edge of a voxel, in spacings of the points
 MOST_VOXELS = 4000  # largest number of occupied voxels of a scan
 GROWTH = 1.25  # least factor between tried edges
 MEASURED = 5000  # number of points whose spacing is measured
 COARSE_TO_FINE = (10.0, 5.0, 2.5)  # correspondence distances of successive ICPs, in voxels
+FLAT = 0.01  # of the middle extent: a cloud whose smallest is no larger is flat, and has no normals that move it
 ITERATIONS = 30  # of each ICP
 PARTNER = 2.0  # largest distance between points of the same surface, in voxels
+ALIKE = 0.8  # cosine of the largest angle between their normals
+AWAY = 0.5  # voxels from its plane, from which a point fits no better than one without partner
 METHOD_UNIT = 20.0  # voxels that registration methods take for the diameter of an object: features then span five
 RUNS, GLOBAL_RUNS = 8, 2  # registrations from other starts, and by features, that propose poses
 START_ROTATION_DEG, START_TRANSLATION = 20.0, 0.1  # root mean square deviation of the starts; translation in extents
-RUN_POINTS, ENACTED_POINTS = 1000, 512  # largest number of points per scan
+RUN_POINTS, SEARCH_POINTS = 1000, 512  # largest number of points per scan
+TRUTH = CauseSettings(moved=OBSERVED)  # of re-enactments
+MOST_POSES = 4  # that are shown and enacted
+UPRIGHT = 0.9  # cosine of the largest angle between the planes of flat scans
 
 
 def voxel_size(clouds: Mapping[str, np.ndarray], unit: str) -> float:
@@ -69,6 +89,62 @@ def in_voxels(points: np.ndarray, edge: float, name: str, unit: str) -> np.ndarr
     return voxels(points, edge)
 
 
+Oriented = tuple[np.ndarray, np.ndarray | None]  # points (N, 3) and their normals
+
+
+class PossiblePose(NamedTuple):
+    """A pose (4×4) that may be true."""
+
+    T: np.ndarray
+    log_posterior: float
+
+
+class VoxelICP:
+    """ICP to a target (M, 3) with one point per voxel, coarse to fine and at the finest level alone: the better counts.
+
+    The coarsest level finds more of the poses that are far off, and loses some that are near. Without normals (M, 3) it
+    is point-to-point.
+    """
+
+    def __init__(self, target: np.ndarray, normals: np.ndarray | None, voxel: float) -> None:
+        self._reach = COARSE_TO_FINE[-1] * voxel
+        self._levels: list[BatchedICP | BatchedPlaneICP] = []
+        for far in COARSE_TO_FINE:
+            if normals is None:
+                self._levels.append(BatchedICP(target, ICPSettings("point_to_point", far * voxel, ITERATIONS)))
+            else:
+                settings = ICPSettings("point_to_plane", far * voxel, ITERATIONS)
+                self._levels.append(BatchedPlaneICP(target, normals, settings))
+
+    def register(self, source: np.ndarray, T_n: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Align points (N, 3) from poses (n, 4, 4), as :meth:`BatchedICP.register`."""
+        near_n = T_n
+        for icp in self._levels[:-1]:
+            near_n = icp.register(source, near_n)[0]
+        ends = self.refine(source, np.concatenate([T_n, near_n]))
+        cost_2_n = clipped_cost(ends[1], ends[2], self._reach).reshape(2, -1)
+        better_n = cost_2_n.argmin(axis=0) * len(T_n) + np.arange(len(T_n))
+        return tuple(part[better_n] for part in ends)
+
+    def refine(self, source: np.ndarray, T_n: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Align at the finest level alone."""
+        return self._levels[-1].register(source, T_n)
+
+
+@dataclass(frozen=True, kw_only=True)
+class VoxelCandidate(ScanCandidate):
+    """Two scans that are registered by :class:`VoxelICP`."""
+
+    normals: np.ndarray | None  # (P, 3) of the target
+    voxel: float
+
+    def icp(self, target: np.ndarray, causes: tuple[int, ...], settings: ICPSettings) -> VoxelICP:
+        """Return the ICP to the target with these of the applied causes."""
+        if self.normals is None or OVERLAP in causes:
+            return VoxelICP(target, self.normals, self.voxel)
+        return VoxelICP(target, self.normals[self.model_common], self.voxel)
+
+
 @dataclass(frozen=True)
 class Scans:
     """Two scans, one point per voxel, centered on the target and in units of its extent."""
@@ -78,21 +154,15 @@ class Scans:
     voxel: float  # edge of a voxel
 
     def registered(self) -> Outcome:
-        """Register by point-to-plane ICP, coarse to fine."""
-        return self.outcome(self._aligned(self.source, np.eye(4)[None])[0])
+        """Register by ICP: point-to-plane, or point-to-point if the scans are flat."""
+        return self.outcome(self._icp.register(self.source, np.eye(4)[None])[0][0])
 
     def registered_by(self, method: str, seed: int | None = None) -> Outcome:
         """Register by a method with its default settings, whose lengths are taken as multiples of a voxel."""
         unit = METHOD_UNIT * self.voxel
-        normals_N_3, normals_M_3 = self._normals
-        seed = seed_of("scans", method) if seed is None else seed
-        pair = Pair(self.source / unit, self.target / unit, np.eye(4), normals_N_3, normals_M_3, seed)
+        pair = self._in_voxels(seed_of("scans", method) if seed is None else seed)
         outcome = make_method(method)(pair)
         return self.outcome(scale_translation(outcome.T_target_source, unit), outcome.failure)
-
-    def refined(self, T_k: np.ndarray) -> np.ndarray:
-        """Refine poses (k, 4, 4) by the finest ICP on all voxels."""
-        return self._planes[-1].register(self.source, T_k)[0]
 
     def outcome(self, T: np.ndarray, failure: str = "") -> Outcome:
         """Measure a pose: share of source points with a partner within two voxels, and their RMSE."""
@@ -102,9 +172,25 @@ class Scans:
         return Outcome(T, float(near_N.mean()), rmse, failure)
 
     def misfit(self, T: np.ndarray) -> float:
-        """Mean squared distance of the source points, clipped at two voxels and divided by the clipped value."""
-        at, reach = self.outcome(T), PARTNER * self.voxel
-        return float(clipped_cost(np.array([at.fitness]), np.array([at.inlier_rmse]), reach)[0]) / reach**2
+        """Return how badly both scans fit at a pose: the mean over their points, 0 at best and 1 where nothing is near.
+
+        The nearest point counts if its normal agrees, by the squared distance from its plane; two walls that cross or
+        slide along each other are close, but not alike. Flat scans count by the squared distance.
+        """
+        source_normals, target_normals = self._normals
+        moved = transform(T, self.source)
+        turned = None if source_normals is None else rotate(T, source_normals)
+        onto = self._unlike((moved, turned), (self.target, target_normals), self._tree)
+        return (onto + self._unlike((self.target, target_normals), (moved, turned), cKDTree(moved))) / 2
+
+    def _unlike(self, points: Oriented, others: Oriented, tree: cKDTree) -> float:
+        distance_N, row_N = tree.query(points[0])
+        if points[1] is None or others[1] is None:
+            return float(np.minimum(np.square(distance_N / self.voxel), 1).mean())
+        normals_N_3 = others[1][row_N]
+        alike_N = (distance_N < PARTNER * self.voxel) & (np.abs(dots(points[1], normals_N_3)) > ALIKE)
+        from_plane_N = dots(points[0] - others[0][row_N], normals_N_3) / (AWAY * self.voxel)
+        return float(np.where(alike_N, np.minimum(np.square(from_plane_N), 1), 1).mean())
 
     def overlap(self, T: np.ndarray) -> tuple[float, float]:
         """Share of the source that lies on the target at a pose, and of the target that lies on the source."""
@@ -113,36 +199,116 @@ class Scans:
         target_share = np.isfinite(cKDTree(moved).query(self.target, distance_upper_bound=reach)[0]).mean()
         return float(source_share), float(target_share)
 
-    def pair(self, T_found: np.ndarray) -> ObservedPair:
-        """Return the pair for a re-enactment, with the results of other registrations as further poses."""
+    def estimated(self, estimator: str, outcome: Outcome, method: str) -> CovarianceEstimate:
+        """Estimate the covariance of a result of a method, in radians and extents."""
+        settings = UncertaintySettings()
+        options = {"starts": settings.starts} if estimator == MONTE_CARLO else {}
+        unit, pair = METHOD_UNIT * self.voxel, self._in_voxels(seed_of("scans", "estimate"))
+        scaled = replace(outcome, T_target_source=scale_translation(outcome.T_target_source, 1 / unit))
+        estimate = make_estimator(estimator, options)
+        estimated = estimate(RegisteredPair(pair, scaled, method, settings.deviation_6()))
+        if estimated.covariance_6_6 is None:
+            return estimated
+        scale_6 = np.repeat([1.0, unit], 3)
+        return CovarianceEstimate(estimated.covariance_6_6 * np.outer(scale_6, scale_6))
+
+    def _in_voxels(self, seed: int) -> Pair:
+        unit = METHOD_UNIT * self.voxel
+        source_normals, target_normals = self._normals
+        return Pair(self.source / unit, self.target / unit, np.eye(4), source_normals, target_normals, seed)
+
+    @property
+    def icp_name(self) -> str:
+        """Name of the method of :meth:`registered`."""
+        return f"{'point_to_point' if self.flat else 'point_to_plane'}, coarse to fine or fine"
+
+    def common(self, T: np.ndarray) -> np.ndarray:
+        """Return the points (n, 3) of the source that lie on the target at a pose, or all if hardly any does."""
+        moved = transform(T, self.source)
+        near_N = np.isfinite(self._tree.query(moved, distance_upper_bound=PARTNER * self.voxel)[0])
+        return moved[near_N] if near_N.sum() >= FEWEST_POINTS else moved
+
+    def poses(self, T_found: np.ndarray, same: float) -> list[PossiblePose]:
+        """Return poses that may be true, the best first; the result is always among them.
+
+        They are the ends of other registrations and of a search, refined on all voxels. Of those that put what both
+        scans show no farther apart than `same`, one is left.
+        """
         xi_n_6 = generator("scans", "starts").normal(size=(RUNS, 6))
         starts_n = exp(xi_n_6 * start_deviation(START_ROTATION_DEG, START_TRANSLATION))
-        local_n = self._aligned(_drawn(self.source, RUN_POINTS, "runs"), starts_n)
-        by_features = [self.registered_by("fpfh_ransac", seed_of("scans", run)) for run in range(GLOBAL_RUNS)]
-        T_n = np.stack([T_found, *local_n, *(run.T_target_source for run in by_features if run.converged)])
-        return ObservedPair(
-            observed=transform(T_found, _drawn(self.source, ENACTED_POINTS, "source")),
-            model=_drawn(self.target, ENACTED_POINTS, "target"),
-            T_init=inverse(T_found),
-            T_runs=T_n @ inverse(T_found),
-            fitness_n=np.ones(len(T_n)),
-            inlier_rmse_n=np.zeros(len(T_n)),
-            axes=("scans",),
-        )
+        T_n = [T_found, *self._icp.register(_drawn(self.source, RUN_POINTS, "runs"), starts_n)[0]]
+        if not self.flat:  # features are those of surfaces
+            by_features = [self.registered_by("fpfh_ransac", seed_of("scans", run)) for run in range(GLOBAL_RUNS)]
+            T_n += [run.T_target_source for run in by_features if run.converged]
+        few = _drawn(self.source, SEARCH_POINTS, "source")
+        random = generator("scans", "hypotheses")
+        T_n += [each.T for each in find_hypotheses(few, self.coarse, np.stack(T_n), ReenactmentSettings(), random)]
+        ends = [T_found, *self._icp.refine(self.source, np.stack(T_n))[0]]
+        misfits = [self.misfit(T) for T in ends]
+        distinct: list[PossiblePose] = []
+        for row in (0, *np.argsort(misfits, kind="stable")):
+            T, posterior = ends[row], -INDEPENDENT * misfits[row]
+            if row and self.flat and not self._upright(T):
+                continue
+            apart = [displacements((T @ inverse(other))[None], self.common(other))[0] for other, _ in distinct]
+            if apart and min(apart) <= same:
+                alike = int(np.argmin(apart))
+                distinct[alike] = PossiblePose(distinct[alike].T, max(distinct[alike].log_posterior, posterior))
+            else:
+                distinct.append(PossiblePose(T, posterior))
+        least = max(pose.log_posterior for pose in distinct) - NEGLIGIBLE
+        result, *others = distinct
+        kept = [result, *(other for other in others if other.log_posterior > least)][:MOST_POSES]
+        return sorted(kept, key=lambda pose: -pose.log_posterior)
 
-    def _aligned(self, source: np.ndarray, T_n: np.ndarray) -> np.ndarray:
-        for icp in self._planes:
-            T_n = icp.register(source, T_n)[0]
-        return T_n
+    def enacted(self, pose: PossiblePose, T_found: np.ndarray) -> Enactment:
+        """Register again with each subset of the causes, as if a pose were true; all of them gave the result."""
+        T, few = pose.T, _drawn(self.source, RUN_POINTS, "runs")
+        hypothesis = Hypothesis(T, np.ones(len(few)), 0.0, self.voxel, 1.0, pose.log_posterior)
+        scans = vars(cropped(hypothesis, few, self._surface, self._noise_scale))
+        candidate = VoxelCandidate(**scans, normals=self._normals[1], voxel=self.voxel)
+        errors = OverlapErrors(candidate.clean[candidate.seen], 1.0)
+        registrar, nothing = Registrar(candidate, TRUTH, misses=True), np.zeros((1, 6))
+        result_error = displacements((T_found @ inverse(T))[None], self.common(T))
+        error_of = {candidate.present: float(capped(result_error)[0])}
+        error_8 = np.empty(len(SUBSETS))
+        for b, subset in enumerate(SUBSETS):
+            causes = tuple(cause for cause in subset if candidate.applied[cause])
+            if causes not in error_of:
+                T_n = registrar.run(causes, nothing).T_target_source_n
+                error_of[causes] = float(capped(errors(inverses(T_n)))[0])
+            error_8[b] = error_of[causes]
+        return Enactment(hypothesis, candidate, error_8, np.zeros(len(SUBSETS)), 0.0)
+
+    def _upright(self, T: np.ndarray) -> bool:
+        """Whether a pose leaves the plane of flat scans in place, not turned over."""
+        return bool(T[:3, :3] @ _axes(self.source)[0] @ _axes(self.target)[0] > UPRIGHT)
 
     @cached_property
-    def _normals(self) -> tuple[np.ndarray, np.ndarray]:
-        return estimate_normals(self.source), estimate_normals(self.target)
+    def flat(self) -> bool:
+        """Whether either scan is flat, as those of 2-D lidars are."""
+        return any(_axes(points)[1] <= FLAT for points in (self.source, self.target))
 
     @cached_property
-    def _planes(self) -> list[BatchedPlaneICP]:
-        settings = [ICPSettings("point_to_plane", far * self.voxel, ITERATIONS) for far in COARSE_TO_FINE]
-        return [BatchedPlaneICP(self.target, self._normals[1], each) for each in settings]
+    def coarse(self) -> ModelSurface:
+        """Some of the target's points."""
+        return ModelSurface(_drawn(self.target, SEARCH_POINTS, "target"))
+
+    @cached_property
+    def _normals(self) -> tuple[np.ndarray, np.ndarray] | tuple[None, None]:
+        return (None, None) if self.flat else (estimate_normals(self.source), estimate_normals(self.target))
+
+    @cached_property
+    def _icp(self) -> VoxelICP:
+        return VoxelICP(self.target, self._normals[1], self.voxel)
+
+    @cached_property
+    def _surface(self) -> ModelSurface:
+        return ModelSurface(self.target)
+
+    @cached_property
+    def _noise_scale(self) -> NoiseScale:
+        return NoiseScale(self._surface, generator("scans", "noise"))
 
     @cached_property
     def _tree(self) -> cKDTree:
@@ -151,3 +317,11 @@ class Scans:
 
 def _drawn(points: np.ndarray, most: int, role: str) -> np.ndarray:
     return points[np.sort(generator("scans", role).permutation(len(points))[:most])]
+
+
+def _axes(points: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return the direction (3,) of the smallest extent of points (N, 3), upward, and its ratio to the middle extent."""
+    variance_3, axes_3_3 = np.linalg.eigh(np.cov(points.T))
+    smallest = axes_3_3[:, 0]
+    upward = smallest * np.sign(smallest[np.abs(smallest).argmax()])
+    return upward, float(np.sqrt(max(variance_3[0], 0) / variance_3[1]))

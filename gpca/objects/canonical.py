@@ -178,6 +178,12 @@ class CanonicalFrame:
         """Return points (N, 3) in this frame."""
         return (points - self.center_3) / self.diameter
 
+    def pose_inside(self, T_b_a: np.ndarray) -> np.ndarray:
+        """Return a motion (4, 4) of the original frame and unit in this frame."""
+        inside = T_b_a.copy()
+        inside[:3, 3] = (T_b_a[:3, 3] + T_b_a[:3, :3] @ self.center_3 - self.center_3) / self.diameter
+        return inside
+
     def pose_outside(self, T_b_a: np.ndarray) -> np.ndarray:
         """Return a motion (4, 4) of this frame in the original frame and unit."""
         outside = T_b_a.copy()

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from itertools import combinations
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,10 +11,15 @@ import trimesh
 
 from gpca import explain_scans
 from gpca.__main__ import main
+from gpca.alignment.features import estimate_normals
+from gpca.alignment.icp import clipped_cost
+from gpca.alignment.pose_error import displacements
 from gpca.errors import InputError
 from gpca.model.clouds import read_points
-from gpca.model.explanation import NOT_SURE
-from gpca.model.scan_registration import in_voxels, voxel_size
+from gpca.model.explanation import GIVEN, NOT_SURE
+from gpca.model.page import length
+from gpca.model.scan_explainer import BAD, GOOD, LEAST_OVERLAP, Evidence, failure_of, state_of
+from gpca.model.scan_registration import COARSE_TO_FINE, VoxelICP, in_voxels, voxel_size
 from gpca.process.environment import open3d_cloud
 from gpca.rigid import exp, inverse, transform
 
@@ -61,7 +67,7 @@ def test_a_right_registration_is_told_from_a_wrong_one(scans, right):
     wrong = explain_scans(source, target, turned)
     assert wrong.failure > right.failure
     assert wrong.state in ("failed", NOT_SURE)
-    assert "nothing was learned from scans" in wrong.learned_from
+    assert "learned from objects, is not used" in wrong.learned_from
     said = json.loads(json.dumps(wrong.as_dict()))
     assert said["state"] == wrong.state
     for words in (wrong.advice, wrong.reason, "overlap   "):
@@ -77,6 +83,121 @@ def test_a_pose_in_text_is_that_in_json_at_utm_coordinates(scans):
     printed = np.array([row.split() for row in rows], float)
     moved = [transform(np.array(T), source) for T in (printed, explanation.as_dict()["T_target_source"])]
     assert np.abs(moved[0] - moved[1]).max() < 1e-5
+
+
+def error_of(T_target_source, source, T_true=TRUE):
+    return float(displacements((T_target_source @ inverse(T_true))[None], transform(T_true, source))[0])
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.7, 2.5])
+def test_the_result_is_among_its_poses_and_no_pose_is_there_twice(scans, turn):
+    source, target = scans
+    said = explain_scans(source, target, exp(np.array([[0, 0, turn, 0, 0, 0]]))[0])
+    poses = said.reenacted.poses
+    [result] = [pose for pose in poses if pose.registered]
+    np.testing.assert_allclose(result.T_target_source, said.T_target_source, atol=1e-6)
+    assert sum(pose.probability for pose in poses) == pytest.approx(1)
+    for one, other in combinations(poses, 2):
+        assert error_of(one.T_target_source, source, other.T_target_source) > said.voxel / 2
+    if said.state == "nominal":
+        assert result.probability > 0.5
+
+
+def test_of_both_icps_the_better_is_kept(scans):
+    source, target = (in_voxels(points, 0.3, "scan", "m") for points in scans)
+    icp = VoxelICP(target, estimate_normals(target), 0.3)
+    starts_n = exp(np.array([[0, 0, turn, 0, 0, 0] for turn in (0.0, 0.3, 0.8, 1.5)]))
+    _, fitness_n, rmse_n = icp.register(source, starts_n)
+    _, fine_fitness_n, fine_rmse_n = icp.refine(source, starts_n)
+    reach = 0.3 * COARSE_TO_FINE[-1]
+    cost_n = clipped_cost(fitness_n, rmse_n, reach)
+    assert (cost_n <= clipped_cost(fine_fitness_n, fine_rmse_n, reach) + 1e-12).all()
+    assert (cost_n < clipped_cost(fine_fitness_n, fine_rmse_n, reach) - 1e-3).any()
+
+
+@pytest.mark.parametrize("plane", [np.eye(4), exp(np.array([[0.9, -0.4, 0.3, 1, 2, 3]]))[0]])
+def test_flat_scans_are_registered_in_their_plane(plane):
+    sides = np.linspace(0, 1, 60)[:, None] * [[1.0, 0]], np.linspace(0, 1, 60)[:, None] * [[0, 0.7]]
+    boxes = [
+        corner + side for corner in ([0, 0], [1.2, 0.5]) for side in (*sides, sides[0] + [0, 0.7], sides[1] + [1, 0])
+    ]
+    target = transform(plane, np.column_stack([np.concatenate(boxes), np.zeros(480)]))
+    T_true = plane @ exp(np.array([[0, 0, 0.105, 0.1, -0.06, 0]]))[0] @ inverse(plane)
+    source = transform(inverse(T_true), target)
+    said = explain_scans(source, target)
+    assert error_of(said.T_target_source, source, T_true) < 0.01
+    assert said.state == "nominal"
+    assert said.method.startswith("point_to_point")
+    assert any("the scans are flat" in note for note in said.notes)
+
+
+FAR = np.array([539_000.0, 4_065_000, 2])
+
+
+@pytest.mark.parametrize("offset", [0, FAR])
+def test_a_given_pose_is_judged_as_it_is(scans, offset):
+    source, target = scans[0], scans[1] + offset
+    T_true = TRUE.copy()
+    T_true[:3, 3] += offset
+    said = explain_scans(source, target, T_target_source=T_true)
+    np.testing.assert_allclose(said.T_target_source, T_true, rtol=1e-9, atol=1e-6)
+    assert (said.state, said.method, said.moved) == ("nominal", GIVEN, None)
+    T_off = T_true.copy()
+    T_off[0, 3] += 3
+    off = explain_scans(source, target, T_target_source=T_off)
+    np.testing.assert_allclose(off.T_target_source, T_off, rtol=1e-9, atol=1e-6)
+    assert off.state == "failed"
+    assert error_of(off.fitting_pose, source, T_true) < off.limit
+
+
+def test_a_limit_is_kept_and_by_default_said(scans, right):
+    source, target = scans
+    assert right.limit == pytest.approx(2 * right.voxel)
+    assert right.limit < 0.05 * np.linalg.norm(np.ptp(target, axis=0))
+    assert f"of an error above {length(right.limit, 'm')}" in right.text()
+    tight = explain_scans(source, target, limit=0.01)
+    assert tight.limit == 0.01
+    assert tight.failure > right.failure
+    assert tight.state != "nominal"  # voxels of 0.2 m do not tell
+
+
+def test_neither_a_poor_fit_nor_another_pose_alone_is_a_close_call():
+    assert GOOD <= failure_of(Evidence(elsewhere=0.0, apart=1.3, overlap=0.6)) < 0.4
+    assert failure_of(Evidence(elsewhere=0.4, apart=1.1, overlap=0.6)) >= BAD
+    assert failure_of(Evidence(elsewhere=1.0, apart=0.55, overlap=0.6)) >= 0.6
+    assert failure_of(Evidence(elsewhere=0.0, apart=0.8, overlap=0.6)) < 0.1
+    assert failure_of(Evidence(elsewhere=0.0, apart=0.0, overlap=0.0)) == 1
+
+
+def test_little_overlap_is_not_sure(scans):
+    source, target = scans
+    T_off = TRUE.copy()
+    T_off[0, 3] += 10.0
+    little = explain_scans(source, target, T_target_source=T_off)
+    assert 0 < little.overlap[0] < LEAST_OVERLAP
+    assert little.state == NOT_SURE
+    assert state_of(1.0, 0.1) == state_of(0.0, 0.1) == NOT_SURE
+
+
+@pytest.mark.parametrize(("estimator", "words"), [("brossard", "by brossard"), ("monte_carlo", "by monte_carlo")])
+def test_an_estimator_says_how_far_the_pose_may_vary(scans, estimator, words):
+    said = explain_scans(*scans, estimator=estimator)
+    assert 0 < said.spread.translation < 1
+    assert words in said.text()
+    assert said.as_dict()["spread"]["estimator"] == estimator
+
+
+def test_an_estimator_that_fails_is_a_note(scans):
+    said = explain_scans(*scans, estimator="censi")
+    assert said.spread is None
+    assert any(note.startswith("censi gives no covariance") for note in said.notes)
+
+
+def test_overlap_is_named_where_the_common_parts_alone_would_have_been_registered(scans):
+    said = explain_scans(transform(inverse(TRUE), room(0, 0.0, 0.6)), room(1, 0.4, 1.0), TRUE)
+    assert said.state != "nominal"
+    assert "overlap" in said.causes
+    assert "causes    overlap" in said.text()
 
 
 def test_a_source_far_from_the_target_has_failed(scans):
@@ -111,6 +232,7 @@ def test_the_command_explains_scans_of_two_formats_in_another_unit_without_a_mod
     ("words", "message"),
     [
         (["--fast"], "--fast: is not for scans; leave it out"),
+        (["--tolerance", "2deg"], "--tolerance: '2deg' is no length"),
         (["--method", "nearest"], "registration method 'nearest': unknown"),
         (["--init", "lost.txt"], "lost.txt: no such file"),
     ],
@@ -169,6 +291,8 @@ def test_voxels_are_chosen_by_the_spacing_and_leave_few(scans):
             "source: spans .* m, too much for voxels of 0.000000001 m; leave out points that are far away",
         ),
         ({"voxel": -1.0}, "voxel: -1 is no length"),
+        ({"limit": 0.0}, "limit: 0 is no length; give a positive one"),
+        ({"T_target_source": np.ones((4, 4))}, "pose is not a rigid transform"),
         ({"method": "nearest"}, "registration method 'nearest': unknown"),
         ({"unit": "feet"}, "unit 'feet'"),
         ({"T_target_source_init": 2 * np.eye(4)}, "initial pose: the pose is not a rigid transform"),
