@@ -101,6 +101,7 @@ def run_explain(options: Namespace) -> int:
     explain: Callable[..., Explanation | ScanExplanation]
     learned, names, extra = LEARNED, dict[str, str](), dict[str, str]()
     if path is None:
+        from gpca.model.clouds import read_pose
         from gpca.model.scan_explainer import explain_scans
 
         explain = partial(
