@@ -82,7 +82,7 @@ def test_a_diagnosis_says_what_it_rests_on_and_fast_that_it_rests_on_less(folder
     assert main(arguments("explain", {"--json": None})) == 0
     text = capsys.readouterr().out
     starts = [line.split()[0] for line in text.splitlines() if line]
-    labels = ["state", "failure", "set", "alarm", "causes", "error", "effects", "observed", "pose"]
+    labels = ["state", "result", "start", "set", "alarm", "causes", "error", "effects", "observed", "pose"]
     assert [start for start in starts if start in labels][: len(labels)] == labels
     assert main(arguments("explain", {"--json": None, "--fast": []})) == 0
     assert "set       none, since nothing is promised" in capsys.readouterr().out
