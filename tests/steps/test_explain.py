@@ -90,7 +90,7 @@ def test_a_diagnosis_says_what_it_rests_on_and_fast_that_it_rests_on_less(folder
 
 # What loads for tenths of a second or more, and what of that an explanation by the model's own ICP needs.
 HEAVY = {"torch", "numba", "scipy", "trimesh", "gpytorch", "sklearn", "pandas", "sympy", "open3d", "torch._dynamo"}
-NEEDED = {"torch", "numba", "scipy", "trimesh", "gpytorch"}
+NEEDED = {"numba", "scipy"}
 CODE = "import sys; from gpca.__main__ import main; print(main(sys.argv[1:]), *sys.modules, file=sys.stderr)"
 
 

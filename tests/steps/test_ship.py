@@ -87,7 +87,8 @@ def test_the_card_has_the_numbers_of_the_run_and_the_same_run_gives_the_same_byt
         "| Frames | 3 | GP-CA |",
         "| LINEMOD in BOP | CC BY 4.0 | seen: the card of a copy of the dataset | Tiny things; Frames |",
         "| LINEMOD-Occlusion in BOP | CC BY-SA 4.0 | seen: ", "0.752 (0.702 to 0.802) | – | – | – | – | 300 (5) |",
-        "above 0.0312 of", "noise 0.01 to 0.0834", '- `moved: "observed"`', f"{model.diagnoser.at_default.threshold:.3f}",
+        "above 0.0312 of", "noise 0.01 to 0.0834", '- `moved: "observed"`',
+        f"{model.diagnoser.at_default.threshold:.3f}",
         f"| {model.diagnoser.held_out['balanced_accuracy']:.3f} | ", " | 12 | 2 |", " | 4 | 12 |",
         f"| {model.diagnoser.held_out['result_auroc_failed']:.3f} | ", "calibrated at 1, 2, 3, 5, 10",
     ):  # fmt: skip
