@@ -2,8 +2,7 @@
 import gc
 import sys
 
-# What a plan makes is kept: searching it for garbage takes a seventh of its time.
-gc.set_threshold(100_000)
+gc.set_threshold(100_000)  # a plan is kept: searching it took a seventh of its time
 sys.path.insert(0, str(workflow.current_basedir))
 from gpca.config.check import read
 from gpca.config.jobs import clear_leftovers, export_to_jobs
