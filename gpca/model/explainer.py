@@ -17,13 +17,13 @@ import numpy as np
 from gpca.alignment.icp import clipped_cost
 from gpca.alignment.methods.interface import Outcome, Pair
 from gpca.alignment.methods.registry import make_method
-from gpca.causes.policy import NOTHING, Decision, RecoveryPolicy
+from gpca.causes.policy import NOTHING, QUEUE, Decision, RecoveryPolicy
 from gpca.causes.truth import NOMINAL
 from gpca.classifier.scores import entropy
 from gpca.errors import InputError
 from gpca.model.clouds import Clouds, voids_of
 from gpca.model.diagnoser import QUICK_HYPOTHESES, QUICK_POINTS
-from gpca.model.diagnosis import CHECK, REFINE, RERUN
+from gpca.model.diagnosis import CHECK, REFINE, RERUN, Diagnosis
 from gpca.model.explanation import GIVEN, Explanation, Motion, PoseSpread
 from gpca.model.file import Model
 from gpca.model.location import model_path
@@ -163,15 +163,8 @@ class Explainer:
             decision = self.policy.decide(scores_C, float(bald), concepts=self.model.gpc.classes)
         elif diagnosis.state == NOMINAL:
             decision = Decision(NOTHING, "", diagnosis.remark)
-        elif self.policy is self.model.policy and (better := diagnosis.reenacted.better):
-            decision = Decision(RERUN, "", f"it fits with probability {better.probability:.2f}; --save-pose writes it")
-        elif not register and diagnosis.start < diagnosis.start_threshold:
-            decision = Decision(
-                REFINE, "", f"registrations from such starts fail with probability {diagnosis.start:.2f}"
-            )
         else:
-            causes = diagnosis.causes
-            decision = self.policy.decide(np.array([*causes.values()]), diagnosis.bald, concepts=(*causes,))
+            decision = self._decided(diagnosis, register)
         return Explanation(
             T_target_source=clouds.frame.pose_outside(T_found) @ clouds.T_target_source_init,
             fitness=outcome.fitness,
@@ -258,6 +251,18 @@ class Explainer:
         ]
         h_D_d = self.model.encoder(aligned.astype(np.float32)[np.array(rows_D_N)], self._device)
         return h_D_d.mean(axis=0, keepdims=True)
+
+    def _decided(self, diagnosis: Diagnosis, registered: bool) -> Decision:
+        """Decide what to do about a wrong result: a better pose comes before the policy, unless that learns from it."""
+        causes, bad_start = diagnosis.causes, diagnosis.start >= diagnosis.start_threshold
+        decision = self.policy.decide(np.array([*causes.values()]), diagnosis.bald, concepts=(*causes,))
+        if self.policy is not self.model.policy or (bad_start and decision.action == QUEUE):
+            return decision
+        if better := diagnosis.reenacted.better:
+            return Decision(RERUN, "", f"it fits with probability {better.probability:.2f}; --save-pose writes it")
+        if not registered and not bad_start:
+            return Decision(REFINE, "", f"registrations from such starts fail with probability {diagnosis.start:.2f}")
+        return decision
 
     def _aligned(self, clouds: Clouds, method: str | None, notes: list[str]) -> Outcome:
         """Register by the model's own ICP or by the given method; a failure adds a note."""

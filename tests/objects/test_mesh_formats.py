@@ -67,7 +67,7 @@ def like_trimesh():
     return files
 
 
-LIKE_TRIMESH = like_trimesh()
+LIKE_TRIMESH = {name: content for name, content in like_trimesh().items() if not name.endswith(".vtk")}  # it reads none
 
 
 @pytest.mark.parametrize("name", LIKE_TRIMESH)

@@ -15,7 +15,8 @@ from tests.steps.by_words import main
 def queued(model, registrations, tmp_path, monkeypatch, capsys):
     """Two registrations that were queued by a model that always queues; capsys is empty."""
     monkeypatch.chdir(tmp_path)
-    always = replace(model.diagnoser, threshold=0.0)
+    levels = tuple(replace(level, threshold=0.0) for level in model.diagnoser.levels)
+    always = replace(model.diagnoser, levels=levels, start_threshold=0.0)
     replace(model, diagnoser=always, policy=RecoveryPolicy(Thresholds(uncertain=0.0))).save("model.pt")
     for row, name in ((0, "first"), (1, "second")):
         scale = registrations.diameter_m[row]
