@@ -5,7 +5,8 @@
 Each argument names two files of a run, such as results/full/model_causes/ycb/seed0.npz and the file of the same name
 below model_reenactments/. docs/guarantee.md has the protocol. `clear` leaves out errors between two thirds of the
 tolerance and the tolerance; `far` are starts that are 30 to 60° off. The last line is a JSON object of the trained
-judge at 3 %: samples, good, families, auroc, auroc_clear, false_alarms, missed; the same of far starts as far_….
+judge at 3 %: samples, good, families, auroc, auroc_clear, false_alarms, missed, and each
+again for far starts, as far_….
 """
 
 from __future__ import annotations

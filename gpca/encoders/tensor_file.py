@@ -12,6 +12,7 @@ from typing import Any
 
 import torch
 
+from gpca.io.array_tree import require_whole
 from gpca.io.files import whole_file
 from gpca.numerals import LARGEST_NUMBER
 
@@ -19,13 +20,7 @@ from gpca.numerals import LARGEST_NUMBER
 def read_tensors(path: str | Path) -> Any:
     """Return the content of a file of torch.save, on the CPU; ValueError for what is implausible, torch has others."""
     with zipfile.ZipFile(path) as archive:
-        members = archive.infolist()
-        if any(info.compress_type != zipfile.ZIP_STORED or info.compress_size != info.file_size for info in members):
-            raise ValueError("it is compressed, which torch does not write")
-        if sum(info.file_size for info in members) > Path(path).stat().st_size:
-            raise ValueError("it claims to contain more than it does")
-        if (damaged := archive.testzip()) is not None:
-            raise ValueError(f"the checksum of its member '{damaged}' differs")
+        require_whole(archive, Path(path))
     content = torch.load(path, weights_only=True, map_location="cpu")
     for name, tensor in _tensors(content):
         if tensor.layout != torch.strided or tensor.device.type != "cpu" or tensor.is_quantized or tensor.is_complex():
@@ -43,21 +38,6 @@ def write_tensors(path: str | Path, content: object) -> None:
     # Given a path, torch.save writes its name into the file; here that would be the temporary one.
     with whole_file(path) as partial, partial.open("wb") as file:
         torch.save(content, file)
-
-
-def require_like(state: object, expected: Mapping[str, torch.Tensor], what: str) -> None:
-    """Raise a ValueError unless a state has the names, shapes and types of `expected`, and no negative variances.
-
-    The expected tensors may be on torch's meta device, where they take no memory.
-    """
-    if not isinstance(state, Mapping) or set(state) != set(expected):
-        raise ValueError(f"its {what} has different parts")
-    for name, tensor in expected.items():
-        value = state[name]
-        if not isinstance(value, torch.Tensor) or value.shape != tensor.shape or value.dtype != tensor.dtype:
-            raise ValueError(f"'{name}' of its {what} has a different shape or type")
-        if name.endswith("running_var") and (value < 0).any():
-            raise ValueError(f"'{name}' of its {what} contains negative variances")
 
 
 def _tensors(content: object) -> Iterator[tuple[str, torch.Tensor]]:

@@ -60,7 +60,7 @@ def require_whole(archive: zipfile.ZipFile, path: Path) -> None:
     """Raise a ValueError unless the members of a zip are stored as they are, without damage."""
     members = archive.infolist()
     if any(info.compress_type != zipfile.ZIP_STORED or info.compress_size != info.file_size for info in members):
-        raise ValueError("it is compressed, which no model is")
+        raise ValueError("it is compressed, which neither torch nor the suite writes")
     if sum(info.file_size for info in members) > path.stat().st_size:
         raise ValueError("it claims to contain more than it does")
     if (damaged := archive.testzip()) is not None:

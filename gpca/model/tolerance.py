@@ -9,6 +9,7 @@ from math import pi, radians, sin
 import numpy as np
 
 from gpca.errors import InputError
+from gpca.model.result import DEFAULT_TOLERANCE
 from gpca.numerals import decimal
 from gpca.objects.surface import METERS_PER_UNIT
 
@@ -64,4 +65,4 @@ class Tolerance:
         return f"{self.value:g}{self.unit}" if self.unit == SHARE else f"{self.value:g} {self.unit}"
 
 
-DEFAULT = Tolerance(3.0, SHARE)
+DEFAULT = Tolerance(100 * DEFAULT_TOLERANCE, SHARE)
