@@ -210,7 +210,8 @@ def _require_diagnoser(state: Mapping) -> None:
     for level in levels:
         tolerance = level["tolerance"]
         _require(type(tolerance) is float and 0 < tolerance <= 1, f"tolerance: {tolerance!r} is not a share")
-    for threshold in (state["start_threshold"], *(level["threshold"] for level in levels)):
+    repaired = [level["repaired_below"] for level in levels if level.get("repaired_below") is not None]
+    for threshold in (state["start_threshold"], *(level["threshold"] for level in levels), *repaired):
         _require(type(threshold) is float and 0 <= threshold <= 2, f"threshold: {threshold!r} is not a probability")
     causes = [(cause, (ABSENT, PRESENT)) for cause in classifier["causes"]]
     for gpc, classes in [(classifier["failure"], (NOMINAL, FAILED)), *causes]:

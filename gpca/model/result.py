@@ -106,17 +106,26 @@ class Calibrated:
     tolerance: float  # diameters
     threshold: float  # probability from which a result is called failed
     guarantee: Guarantee | None = None  # sets of states and alarm
+    repaired_below: float | None = None  # probability below which a repaired pose is called so, with a promise
+
+    @property
+    def good_below(self) -> float:
+        """The probability below which a pose that takes the place of another is called good."""
+        bound = self.repaired_below
+        if bound is None and self.guarantee is not None:
+            bound = self.guarantee.failure_alarm.good_below
+        return self.threshold if bound is None else min(bound, self.threshold)
 
     def state(self) -> dict[str, object]:
         """Return plain values for :meth:`from_state`."""
-        guarantee = self.guarantee and self.guarantee.to_dict()
-        return {"tolerance": self.tolerance, "threshold": self.threshold, "guarantee": guarantee}
+        plain = {"tolerance": self.tolerance, "threshold": self.threshold, "repaired_below": self.repaired_below}
+        return plain | {"guarantee": self.guarantee and self.guarantee.to_dict()}
 
     @classmethod
     def from_state(cls, state: Mapping) -> Calibrated:
         """Return what :meth:`state` holds."""
         guarantee = None if state["guarantee"] is None else Guarantee.from_dict(state["guarantee"])
-        return cls(state["tolerance"], state["threshold"], guarantee)
+        return cls(state["tolerance"], state["threshold"], guarantee, state.get("repaired_below"))
 
 
 UNCALIBRATED = (Calibrated(DEFAULT_TOLERANCE, EVEN),)
@@ -132,7 +141,9 @@ def calibrated_at(levels: Sequence[Calibrated], tolerance: float) -> Calibrated:
         return Calibrated(tolerance, nearest.threshold)
     both = lower.guarantee, upper.guarantee
     cautious = both[0].more_cautious(both[1]) if both[0] and both[1] else None
-    return Calibrated(tolerance, max(lower.threshold, upper.threshold), cautious)
+    bounds = [level.repaired_below for level in (lower, upper) if level.repaired_below is not None]
+    below = min(bounds) if len(bounds) == 2 else None
+    return Calibrated(tolerance, max(lower.threshold, upper.threshold), cautious, below)
 
 
 def _tolerance(level: Calibrated) -> float:

@@ -1,0 +1,166 @@
+"""Repair of a registration: a pose that was found wrong gives way to a hypothesis of the true one, if that is right.
+
+All poses take what was observed, where it lay before the registration, to the model; lengths are in diameters. What is
+proposed does not depend on a judge, so that one file of proposals serves judges that learned from any families.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from gpca.alignment.batched_icp import BatchedICP
+from gpca.alignment.icp import ICPSettings
+from gpca.alignment.methods.interface import Pair
+from gpca.alignment.methods.registry import make_method
+from gpca.causes.settings import MODEL, Moved
+from gpca.model.result import Calibrated, Evidence, ResultJudge
+from gpca.reenactment.hypotheses import FEWEST_INLIERS, LAST_ITERATIONS, SAME, distinct_rows
+from gpca.reenactment.mixture import Mixture
+from gpca.reenactment.surface import ModelSurface
+from gpca.rigid import inverse, inverses, transform
+
+GOOD, REPAIRED, NOT_REPAIRED, SEVERAL = VERDICTS = ("good", "repaired", "not repaired", "several poses fit")
+WRONG = 0.05  # largest share of wrong poses among those that are called repaired
+LEAST_WEIGHT = 0.05  # of a pose that is offered beside others
+LARGE = 0.5  # of the largest distance: from this on, a point belongs to the part in which two poses differ
+
+Refine = Callable[[np.ndarray, np.ndarray], np.ndarray]  # points (n, 3), a pose (4, 4) -> where a method ends
+Measure = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]  # poses (n, 4, 4) -> fitness (n,), inlier RMSE (n,)
+
+
+@dataclass(frozen=True)
+class Proposals:
+    """A registered pose and those that may take its place."""
+
+    T_n: np.ndarray  # (n, 4, 4) the registered pose; then hypotheses, refined, each once, the most probable first
+    weight_n: np.ndarray  # (n,) probabilities of the hypotheses that end there, 0 for the registered pose
+    evidence: Evidence  # of the n poses, under the hypotheses
+
+    def set_of(self, rows: list[int]) -> Evidence:
+        """Return the evidence of the claim that one of these poses is right, which fits as the first of them does."""
+        whole, first = self.evidence, rows[:1]
+        distance_1_K = whole.distance_N_K[rows].min(axis=0, keepdims=True)
+        return Evidence(distance_1_K, whole.weight_N_K[first], whole.inlier_rmse_N[first], whole.fitness_N[first])
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What became of a registration."""
+
+    name: str  # one of `VERDICTS`
+    row: int  # of the pose to use, among the proposals: the registered one unless it was repaired
+    rows: tuple[int, ...]  # of the poses that fit, if several do: one of them is right
+    probability_n: np.ndarray  # of each proposal to be off by more than the tolerance
+
+
+def propose(
+    observed: np.ndarray,
+    surface: ModelSurface,
+    T_registered: np.ndarray,
+    T_K: np.ndarray,
+    weight_K: np.ndarray,
+    refine: Refine,
+    measure: Measure,
+) -> Proposals:
+    """Refine hypotheses (K, 4, 4) by a registration method, on the observed points (N, 3) that are no outliers there.
+
+    Args:
+        weight_K: their probabilities, 0 for entries that only fill up.
+        refine: the registration method from a pose.
+        measure: fitness and inlier RMSE of poses, as the judge knows them.
+    """
+    possible = np.flatnonzero(weight_K > 0)
+    possible = possible[np.argsort(-weight_K[possible], kind="stable")]
+    inlier_k_N = inliers(observed, surface, T_K[possible])
+    T_k = np.array([refine(observed[inlier_N], T) for inlier_N, T in zip(inlier_k_N, T_K[possible], strict=True)])
+    rows = distinct_rows(surface, T_k, len(T_k), SAME / 2)
+    apart_k_n = np.stack([surface.apart(T_k @ inverse(T_k[row])) for row in rows], axis=1)
+    weight_n = np.bincount(apart_k_n.argmin(axis=1), weight_K[possible], minlength=len(rows))
+    T_n = np.concatenate([T_registered[None], T_k[rows]])
+    distance_n_K = np.stack([surface.errors(T @ inverses(T_K)) for T in T_n])
+    fitness_n, rmse_n = measure(T_n)
+    evidence = Evidence(distance_n_K, np.tile(weight_K, (len(T_n), 1)), rmse_n, fitness_n)
+    return Proposals(T_n, np.append(0.0, weight_n), evidence)
+
+
+def by_icp(model: np.ndarray, icp: ICPSettings) -> Refine:
+    """Return what refines a pose to a model (M, 3) by the compiled ICP."""
+    registrar = BatchedICP(model, icp)
+    return lambda points, T: registrar.register(points, T[None])[0][0]
+
+
+def by_method(model: np.ndarray, name: str, seed: int) -> Refine:
+    """Return what refines a pose by a registration method of the registry; where this fails, the pose stays."""
+    method = make_method(name)
+    return lambda points, T: method(Pair(points, model, T, seed=seed).with_normals()).T_target_source
+
+
+def measured(observed: np.ndarray, model: np.ndarray, icp: ICPSettings, moved: Moved) -> Measure:
+    """Return what measures poses of an observed cloud by the partners of the cloud that ICP moves."""
+    if moved == MODEL:
+        return lambda T_n: BatchedICP(observed, icp).register(model, inverses(T_n), max_iterations=0)[1:]
+    return lambda T_n: BatchedICP(model, icp).register(observed, T_n, max_iterations=0)[1:]
+
+
+def decide(judge: ResultJudge, level: Calibrated, proposals: Proposals, tolerance: float) -> Verdict:
+    """Return the verdict: a pose that is not called failed stays, another takes its place only if it is called good.
+
+    If none is called good, the fewest most probable poses of which one is right are given, if they are called good so.
+    """
+    probability_n = judge.probability(proposals.evidence, tolerance)
+    if probability_n[0] < level.threshold:
+        return Verdict(GOOD, 0, (), probability_n)
+    below, best = level.good_below, 1 + int(probability_n[1:].argmin())
+    if probability_n[best] < below:
+        return Verdict(REPAIRED, best, (), probability_n)
+    offered = [row for row in np.argsort(-proposals.weight_n, kind="stable").tolist() if row]
+    offered = [row for row in offered if proposals.weight_n[row] >= LEAST_WEIGHT]
+    for count in range(2, len(offered) + 1):
+        if judge.probability(proposals.set_of(offered[:count]), tolerance)[0] < below:
+            return Verdict(SEVERAL, 0, tuple(offered[:count]), probability_n)
+    return Verdict(NOT_REPAIRED, 0, (), probability_n)
+
+
+def calibrated_repair(probability_N: np.ndarray, off_N: np.ndarray, wrong: float = WRONG) -> float | None:
+    """Return the probability below which at most the share `wrong` of repaired poses is off; None for too few samples.
+
+    The samples are the likeliest proposals for registrations that were called failed, of families that the judge did
+    not learn; a new one may be off, and counts as such.
+    """
+    order = np.argsort(probability_N, kind="stable")
+    called_N = np.arange(2, len(order) + 2)
+    allowed_N = (np.cumsum(off_N[order]) + 1) / called_N <= wrong
+    last_N = np.append(np.diff(probability_N[order]) > 0, True)  # of equal probabilities, all are called so
+    kept = np.flatnonzero(allowed_N & last_N)
+    return float(np.nextafter(probability_N[order][kept[-1]], 1)) if len(kept) else None
+
+
+def inliers(points: np.ndarray, surface: ModelSurface, T_K: np.ndarray) -> np.ndarray:
+    """Return which points (K, N) are no outliers at poses (K, 4, 4); all, where next to none would be left."""
+    fits = Mixture(surface.points, surface.spacing / 2).fit(points, T_K, LAST_ITERATIONS, moving=False)
+    inlier_K_N = fits.inlier_n_N > 0.5
+    return inlier_K_N | (inlier_K_N.sum(axis=1) < FEWEST_INLIERS)[:, None]
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of the target's surface."""
+
+    direction: np.ndarray  # (3,) unit vector from the middle of the surface to that of the part
+    share: float  # of the surface
+    distance: float  # mean over the part, diameters
+
+
+def part_of(surface: ModelSurface, distance_M: np.ndarray, inside_M: np.ndarray) -> Part:
+    """Describe which points (M,) of the surface belong to a part."""
+    away = surface.points[inside_M].mean(axis=0) - surface.points.mean(axis=0)
+    return Part(away / max(np.linalg.norm(away), 1e-9), float(inside_M.mean()), float(distance_M[inside_M].mean()))
+
+
+def difference(surface: ModelSurface, T_one: np.ndarray, T_other: np.ndarray) -> Part:
+    """Return what tells two poses apart: where one has surface, and the other has none nearby."""
+    distance_M = surface.distances(transform(T_other @ inverse(T_one), surface.points))
+    return part_of(surface, distance_M, distance_M >= LARGE * distance_M.max())
