@@ -5,12 +5,13 @@ import sys
 import pytest
 
 from gpca.process import plugins
-from gpca.process.code_files import ROOT, _imports
+from gpca.process.code_files import ROOT, _file, _imports
 
 
 def forget():
     plugins._announced.cache_clear()
     _imports.cache_clear()
+    _file.cache_clear()
 
 
 def lies_outside(module):

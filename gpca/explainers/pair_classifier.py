@@ -20,6 +20,7 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import seed_of
 
 QUANTILES = 100  # of each descriptor, at most
+RANKED = 10_000  # samples of which the quantiles are taken, at most
 FARTHEST = 3.0  # standard deviations, to which normalized descriptors are clipped
 AT_THE_END = 1e-7  # a descriptor this close to its last quantile has reached it
 NEIGHBORS = 3  # training samples to which the distance is averaged
@@ -38,11 +39,11 @@ class NormalizedFeatures:
 
     def fit(self, features_N_F: np.ndarray) -> NormalizedFeatures:
         """Learn the ranks."""
-        from sklearn.preprocessing import QuantileTransformer
-
-        n, seed = min(QUANTILES, len(features_N_F)), seed_of(*self._axes, "quantiles") % 2**32
-        fitted = QuantileTransformer(n_quantiles=n, output_distribution="normal", random_state=seed).fit(features_N_F)
-        self._quantiles_Q_F = fitted.quantiles_
+        rows_N, seed = np.arange(len(features_N_F)), seed_of(*self._axes, "quantiles") % 2**32
+        if len(rows_N) > RANKED:
+            np.random.RandomState(seed).shuffle(rows_N)
+        percents_Q = 100 * np.linspace(0, 1, min(QUANTILES, len(rows_N)))
+        self._quantiles_Q_F = np.nanpercentile(features_N_F[rows_N[:RANKED]], percents_Q, axis=0)
         return self
 
     def __call__(self, features_N_F: np.ndarray) -> np.ndarray:

@@ -45,7 +45,7 @@ def code_files(*modules: str) -> list[str]:
     return sorted(prefixes.get(at, "") + file.removeprefix(at) for file, at in inside.items())
 
 
-_HOLD_STATEMENTS = (ast.stmt, ast.excepthandler, ast.match_case)  # imports are statements, not expressions
+_STATEMENTS = ("body", "orelse", "finalbody", "handlers", "cases")  # where a statement holds others, as imports are
 
 
 @cache
@@ -61,7 +61,7 @@ def _imports(module: str) -> tuple[str, tuple[str, ...]]:
         if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
             nodes += node.orelse
         else:
-            nodes += (child for child in ast.iter_child_nodes(node) if isinstance(child, _HOLD_STATEMENTS))
+            nodes += (child for part in _STATEMENTS for child in getattr(node, part, ()))
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -128,6 +128,7 @@ def _file_of(module: str) -> Path:
     return file
 
 
+@cache
 def _file(module: str) -> Path | None:
     first = module.split(".")[0]
     path = (ROOT if first in PACKAGES else ROOTS.get(first, ROOT)).joinpath(*module.split("."))

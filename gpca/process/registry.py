@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import pkgutil
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
@@ -41,8 +41,8 @@ class Registry(Generic[Entry]):
 
     def by_module(self) -> dict[str, dict[str, Entry]]:
         """Return the entries of each module."""
-        files = pkgutil.iter_modules(import_module(self.folder).__path__)
-        names = sorted(f"{self.folder}.{file.name}" for file in files)
+        files = {file for folder in import_module(self.folder).__path__ for file in os.listdir(folder)}
+        names = sorted(f"{self.folder}.{file[:-3]}" for file in files if file.endswith(".py") and file != "__init__.py")
         by_module = {name: getattr(import_module(name), self.variable, {}) for name in (*self.first, *names)}
         if self.outside is None:
             return by_module

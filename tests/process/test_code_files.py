@@ -30,6 +30,11 @@ FILES = {
 }
 
 
+def forget():
+    module_under_test._imports.cache_clear()
+    module_under_test._file.cache_clear()
+
+
 @pytest.fixture
 def project(tmp_path, monkeypatch):
     for name, text in FILES.items():
@@ -37,9 +42,9 @@ def project(tmp_path, monkeypatch):
         (tmp_path / name).write_text(text)
     monkeypatch.setattr(module_under_test, "ROOT", tmp_path)
     monkeypatch.chdir(tmp_path)
-    module_under_test._imports.cache_clear()
+    forget()
     yield tmp_path
-    module_under_test._imports.cache_clear()
+    forget()
 
 
 @pytest.mark.parametrize(

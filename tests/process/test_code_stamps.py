@@ -18,7 +18,7 @@ def stamp(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
     def forget():
-        for cached in (files_of_code._imports, code_stamps._sha256, code_stamp):
+        for cached in (files_of_code._imports, files_of_code._file, code_stamps._sha256, code_stamp):
             cached.cache_clear()
 
     def fresh(*modules):
