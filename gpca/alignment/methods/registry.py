@@ -1,4 +1,4 @@
-"""Every registration method by name, one or several per file of this folder."""
+"""Every registration method by name, one or several per file of this folder, and those that the re-enactment has."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ from gpca.process.registry import Registry
 from gpca.settings import require_arguments
 
 # Includes methods whose package is missing.
-REGISTRY: Registry[MethodEntry] = Registry("registration method", __package__, "METHODS", outside=MethodEntry)
+REENACTMENT = ("gpca.reenactment.registration",)
+REGISTRY: Registry[MethodEntry] = Registry(
+    "registration method", __package__, "METHODS", first=REENACTMENT, outside=MethodEntry
+)
 methods, method_entry, method_module = REGISTRY.entries, REGISTRY.entry, REGISTRY.module
 
 
