@@ -15,9 +15,9 @@ from gpca.active_learning.acquisition import Pool, select
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
-from gpca.io.arrays import TEXT, WHOLE, save_arrays
+from gpca.io.arrays import TEXT, WHOLE, write_arrays
 from gpca.io.container import Container, array
-from gpca.io.files import Axes, require_file
+from gpca.io.files import append_row, require_file, whole_file
 from gpca.numerals import whole
 from gpca.pairs.dataset import ragged
 from gpca.seeds import generator
@@ -51,9 +51,10 @@ class Queue(Container):
         """Return the target cloud (Q, 3) of row i."""
         return self.part("target_points", i)
 
-    def save(self, path: str | Path, axes: Axes | None = None) -> None:
-        """Write the npz, marked as a queue."""
-        save_arrays(path, self.arrays | {QUEUE_MARK: np.array(QUEUE_VERSION)}, axes)
+    @property
+    def marked(self) -> dict[str, np.ndarray]:
+        """The arrays of a file, with the mark of a queue."""
+        return self.arrays | {QUEUE_MARK: np.array(QUEUE_VERSION)}
 
 
 def is_queue(path: str | Path) -> bool:
@@ -75,16 +76,16 @@ def add_to_queue(path: str | Path, aligned: np.ndarray, target: np.ndarray, h_1_
         h=h_1_d.astype(np.float32),
         **ragged([aligned.astype(np.float32)], [target.astype(np.float32)]),
     )
-    if not path.exists():
-        one.save(path)
-        return 1
-    if not is_queue(path):
-        raise InputError(path, "is not a queue", "name another file with --queue")
-    before = Queue.load(path)
-    if before.h.shape[1] != one.h.shape[1]:
-        raise InputError(path, "is a queue of another model", "name another file with --queue")
-    Queue.joined([before, one]).save(path)
-    return len(before) + 1
+    with whole_file(path) as partial:  # no other process adds to it meanwhile
+        if path.exists():
+            if not is_queue(path):
+                raise InputError(path, "is not a queue", "name another file with --queue")
+            before = Queue.load(path)
+            if before.h.shape[1] != one.h.shape[1]:
+                raise InputError(path, "is a queue of another model", "name another file with --queue")
+            one = Queue.joined([before, one])
+        write_arrays(partial, one.marked)
+    return len(one)
 
 
 class LabelFile:
@@ -124,10 +125,7 @@ class LabelFile:
 
     def add(self, key: Key, concept: str) -> None:
         """Append one answer and write it to disk."""
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        with self.path.open("a", newline="", encoding="utf-8") as file:
-            rows = [(key[1], key[0], concept)] if file.tell() else [LABEL_COLUMNS, (key[1], key[0], concept)]
-            csv.writer(file, lineterminator="\n").writerows(rows)
+        append_row(self.path, (key[1], key[0], concept), LABEL_COLUMNS)
         self.labels[key] = concept
 
 

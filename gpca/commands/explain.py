@@ -12,9 +12,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gpca.commands.explain_inputs import Inputs, from_rows, from_words, inputs_in, target_reader
+from gpca.commands.explain_inputs import FILES, Inputs, from_rows, from_words, inputs_in, target_reader
 from gpca.errors import InputError
-from gpca.io.files import require_outputs
+from gpca.io.files import require_apart
 from gpca.jobs.arguments import length
 from gpca.model.location import model_path, require_model
 from gpca.objects.surface import METERS_PER_UNIT
@@ -79,6 +79,8 @@ def run_explain(options: Namespace) -> int:
     if path is not None:
         require_model(path)
     rows = from_rows(options) if options.pairs else []
+    of_rows = [options.pairs.parent / name for _, row in rows for key in FILES if (name := row.get(key))]
+    require_apart(options, ["html", "png", "queue", "save_pose"], [*filter(None, [path]), *of_rows])
     inputs = [] if options.pairs else from_words(options)
     for each in inputs:
         each.require_formats()
@@ -177,7 +179,7 @@ def _length(text: str, unit: str) -> float:
 
 
 def _require_options(options: Namespace) -> None:
-    """Reject options that exclude one another, and outputs that cannot be written."""
+    """Reject options that exclude one another."""
     if options.pairs:
         if options.source or not options.json_lines:
             fault = "has sources and targets of its own" if options.source else "prints one line for each pair"
@@ -201,9 +203,6 @@ def _require_options(options: Namespace) -> None:
             raise InputError("--pose", f"is judged as it is, without --{name}", "leave one of them out")
     if options.png and find_spec("matplotlib") is None:
         raise InputError("--png", "needs the package matplotlib, which is not installed", "pip install matplotlib")
-    read = [*options.source, options.target, options.init, options.pose, options.model, options.pairs]
-    outputs = [path for path in (options.html, options.png, options.queue, options.save_pose) if path]
-    require_outputs(outputs, [path for path in read if path])
 
 
 def _write(

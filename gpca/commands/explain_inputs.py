@@ -20,6 +20,7 @@ from gpca.objects.sizes import AS_OPTIONS, extent, require_sizes
 from gpca.objects.surface import METERS_PER_UNIT, measured
 
 COLUMNS = ("source", "target")  # of a CSV of pairs; optional ones are init, unit and source_unit
+FILES = (*COLUMNS, "init")
 TargetReader = Callable[[Path], tuple[np.ndarray, CanonicalFrame | None]]
 PAIRS_REMEDY = "give the columns source and target, and perhaps init, unit and source_unit"
 
@@ -83,7 +84,7 @@ def from_rows(options: Namespace) -> list[tuple[str, dict[str, str]]]:
 
 def inputs_in(row: dict[str, str], options: Namespace) -> Inputs:
     """Return the files of a row, whose paths are relative to the CSV, and whose units are first those of its own."""
-    entries = {name: (row.get(name) or "").strip() for name in (*COLUMNS, "init", "unit", "source_unit")}
+    entries = {name: (row.get(name) or "").strip() for name in (*FILES, "unit", "source_unit")}
     if None in row:
         raise InputError("row", "has more entries than columns", "quote entries with commas")
     for name in COLUMNS:

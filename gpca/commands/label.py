@@ -17,9 +17,10 @@ from gpca.attribution.predictions import write_predictions
 from gpca.classifier.scores import Attribution
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
-from gpca.io.files import require_file, require_outputs
+from gpca.io.files import require_apart, require_file
 from gpca.jobs.arguments import COUNT
 from gpca.jobs.provenance import record_provenance
+from gpca.model.location import model_path
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.cloud_views import draw_query
@@ -52,11 +53,9 @@ def add_label_arguments(parser: ArgumentParser) -> None:
 
 def run_label(options: Namespace) -> None:
     settings = read_settings(GPCSettings, {"learning_rate": 0.2, "iterations": 150} | options.settings)
-    read = [options.registrations, options.embeddings, options.answers, options.model]
-    outputs = [options.labels, options.picture, options.predictions, options.out]
-    require_outputs([path for path in outputs if path], [path for path in read if path])
     require_file(options.registrations, "no such file", "make it with Snakemake, or by 'gpca explain --queue'")
     queued = is_queue(options.registrations)
+    require_apart(options, ["labels", "picture", "predictions", "out"], [model_path(options.model)] if queued else [])
     place = "is not for the queue of an explanation" if queued else "is for the queue of an explanation alone"
     for name in ("embeddings", "predictions") if queued else ("model", "out"):
         if getattr(options, name):
@@ -103,7 +102,6 @@ def run_label(options: Namespace) -> None:
 
 def _queued(options: Namespace) -> tuple[Queue, Model]:
     from gpca.model.file import Model
-    from gpca.model.location import model_path
 
     path = model_path(options.model)
     model, queue = Model.load(path), Queue.load(options.registrations)

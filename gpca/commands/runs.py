@@ -92,14 +92,14 @@ def add_compare_arguments(parser: ArgumentParser) -> None:
 def run_compare(options: Namespace) -> int:
     """Write a page with the tables and figures of two runs, and print how many numbers of each table differ."""
     from gpca.declarations.registry import registered
-    from gpca.io.files import require_outputs
+    from gpca.io.files import require_apart
     from gpca.page.two_runs import ALONE, APART, DIFFERENT, compare_tables, write_comparison
 
     folders = (options.one, options.other)
     for folder in folders:
         if not folder.is_dir():
             raise InputError(folder, "no such folder", "name the folder of a finished run, such as results/default")
-    require_outputs([options.out])
+    require_apart(options, ["out"])
     titles = {result.name: result.title for result in registered()}
     tables, alone = compare_tables(folders, titles)
     write_comparison(folders, tables, alone, titles, options.out)

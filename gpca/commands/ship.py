@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from gpca.causes.judged import CEILING, RECALL
 from gpca.errors import InputError
 from gpca.evaluation.measures import POOLED, read_clustered
-from gpca.io.files import require_outputs, whole_file
+from gpca.io.files import require_apart, whole_file, write_text
 from gpca.io.structured_text import load_own_yaml, read_json
 from gpca.jobs.provenance import record_path
 from gpca.model.file import VERSION, Model
@@ -239,7 +239,8 @@ def add_ship_arguments(parser: ArgumentParser) -> None:
 def run_ship(options: Namespace) -> None:
     """Write both files or neither; the same run gives the same bytes."""
     scores = options.model.with_name("cause_intervals.csv")
-    require_outputs([options.out, options.card], [options.model, scores])
+    made = [scores, record_path(options.model), options.model.with_name("objects")]
+    require_apart(options, ["out", "card"], made)
     model = Model.load(options.model)
     if model.stand_in:
         raise InputError(options.model, "was trained on objects that the package drew", "ship a model of real objects")
@@ -258,5 +259,4 @@ def run_ship(options: Namespace) -> None:
     text = card(options.out.name, content, model, record, sources, read_clustered(scores))
     with whole_file(options.out) as partial:
         partial.write_bytes(content)
-    with whole_file(options.card) as partial:
-        partial.write_text(text, encoding="utf-8")
+    write_text(options.card, text)

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from gpca.errors import InputError, require_known
-from gpca.io.files import require_outputs, whole_file
+from gpca.io.files import PAGE, require_apart, require_outputs, write_text
 from gpca.jobs.arguments import COUNT
 from gpca.tracks import leaderboard
 from gpca.tracks.published import FOLDER, Published
@@ -36,13 +36,13 @@ def run_bench(options: Namespace) -> None:
     """Fit a method, predict and score on the samples of a track; missing samples are made first."""
     from gpca.process.processor import cpu_name
     from gpca.tracks.published import Method
-    from gpca.tracks.samples import TrackSamples
+    from gpca.tracks.samples import TrackSamples, cache_of
     from gpca.tracks.submission import Submission
     from gpca.tracks.trial import try_method
 
     track = track_of(options.track)
-    if options.out:
-        require_outputs([options.out])
+    module = options.method.replace(".", "/")  # if it is below the working directory
+    require_apart(options, ["out"], [module, f"{module}.py", cache_of(track)])
     names = _method_names(options.method, track)
     if options.out and len(names) > 1:
         fault = f"lists {len(names)} methods for this track, and --out holds the predictions of one"
@@ -115,9 +115,9 @@ def run_leaderboard(options: Namespace) -> int:
     """Check all submissions and write the page; faults are lines on stderr, with status 2."""
     from gpca.page.page import render
 
-    page = options.out or options.submissions / "index.html"
+    page = options.out = options.out or options.submissions / f"index{PAGE}"
     if not options.check:
-        require_outputs([page])
+        require_apart(options, ["out"])
     submissions, faults = leaderboard.read_submissions(options.submissions)
     if faults:
         print(*faults, sep="\n", file=sys.stderr)
@@ -125,9 +125,7 @@ def run_leaderboard(options: Namespace) -> int:
     counts = ", ".join(f"{len(entries)} of the track {track}" for track, entries in submissions.items()) or "none"
     print(f"submissions: {counts}")
     if not options.check:
-        with whole_file(page) as partial:
-            text = render("leaderboard.html.jinja", boards=leaderboard.boards(submissions))
-            partial.write_text(text, encoding="utf-8")
+        write_text(page, render("leaderboard.html.jinja", boards=leaderboard.boards(submissions)))
         print(page)
     return 0
 
@@ -152,9 +150,11 @@ def run_ship_predictions(options: Namespace) -> None:
     from gpca.tracks.shipping import collect
 
     total = 0
-    for track in map(track_of, options.tracks):
-        published = collect(track, options.folder, track.config())
-        published.save(path := options.out / f"{track.name}.npz")
+    paths = {name: options.out / f"{track_of(name).name}.npz" for name in options.tracks}
+    require_outputs(paths.values(), [options.folder])
+    for name, path in paths.items():
+        published = collect(track_of(name), options.folder, track_of(name).config())
+        published.save(path)
         total += path.stat().st_size
         print(f"{path}: {len(published.methods)} methods, {len(published.rows)} samples, version {published.version}")
     if total > LARGEST_BYTES:

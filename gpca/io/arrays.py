@@ -28,10 +28,15 @@ def save_arrays(path: str | Path, arrays: Mapping[str, np.ndarray], axes: Axes |
 
     The axes are kept beside the arrays as ``source`` and ``seed``.
     """
+    with whole_file(path) as partial:
+        write_arrays(partial, arrays, axes)
+
+
+def write_arrays(path: Path, arrays: Mapping[str, np.ndarray], axes: Axes | None = None) -> None:
+    """Write what :func:`save_arrays` does to a temporary file."""
     source, seed = axes or (None, None)
     of = {name: np.array(value) for name, value in (("source", source), ("seed", seed)) if value is not None}
-    with whole_file(path) as partial:
-        np.savez(partial, allow_pickle=False, **arrays, **of)
+    np.savez(path, allow_pickle=False, **arrays, **of)
 
 
 def load_arrays(

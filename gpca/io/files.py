@@ -6,13 +6,17 @@ another source or seed often have the same shapes, so the step that makes a file
 
 from __future__ import annotations
 
+import csv
+import errno
+import fcntl
 import hashlib
+import io
 import os
 import shutil
 import stat
 import warnings
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 from unicodedata import category
@@ -20,6 +24,8 @@ from unicodedata import category
 from gpca.errors import InputError
 
 if TYPE_CHECKING:
+    from argparse import Namespace
+
     import numpy as np
 
 LARGEST_FILE_BYTES = 10**9  # twice Stanford's Lucy of 28 million triangles; parsing takes several times the size
@@ -31,7 +37,11 @@ MOST_PIXELS = 2**26  # of an image, ten times a depth camera's
 IMAGE_FORMATS = ("PNG", "JPEG", "TIFF")  # Pillow knows others by their content, and runs programs for some
 SPLITS = ("train", "test")
 Axes = tuple[str, int | None]  # source and seed; the objects of a source have no seed
-_BREAKS = ("Cc", "Zl", "Zp")  # control characters, and separators of lines and paragraphs
+PAGE = ".html"
+FEW_BYTES = 2**16  # of a full disk
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+# Control characters, separators of lines and paragraphs, and bytes that are not of UTF-8.
+_BREAKS = ("Cc", "Zl", "Zp", "Cs")
 
 
 def require_file(path: str | Path, fault: str, remedy: str, largest_bytes: float = LARGEST_FILE_BYTES) -> None:
@@ -95,23 +105,120 @@ def require_axes(path: str | Path, actual: Axes, expected: Axes | None) -> None:
 def whole_file(path: str | Path) -> Iterator[Path]:
     """Yield a temporary path beside `path`, with its suffix, renamed to `path` on success and removed on failure.
 
-    A killed run leaves the old file, and a partial one with a fixed name that the next writer replaces.
+    A killed run leaves the old file, and a partial one with a fixed name that the next writer replaces. Writers of one
+    file wait for one another, so the block may read the old file to add to it.
     """
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f".{path.stem}.partial{path.suffix}")
-    try:
+    with full_disk_named(path), _alone(path.with_name(f".{path.stem}.partial{path.suffix}")) as partial:
         yield partial
         partial.replace(path)
+
+
+@contextmanager
+def whole_folder(path: str | Path) -> Iterator[Path]:
+    """Yield a temporary folder beside `path`, which replaces `path` on success and is removed on failure."""
+    path = Path(path)
+    with full_disk_named(path), _alone(path.with_name(f".{path.name}.partial"), folder=True) as partial:
+        yield partial
+        shutil.rmtree(path, ignore_errors=True)
+        partial.replace(path)
+
+
+@contextmanager
+def _alone(partial: Path, folder: bool = False) -> Iterator[Path]:
+    """Make a file or folder, empty and locked, that is removed if the block fails."""
+    partial.parent.mkdir(parents=True, exist_ok=True)
+    while True:
+        if folder:
+            partial.mkdir(exist_ok=True)
+        locked = os.open(partial, os.O_NOFOLLOW | (os.O_RDONLY if folder else os.O_RDWR | os.O_CREAT), 0o666)
+        with suppress(OSError):  # a file system without locks
+            fcntl.flock(locked, fcntl.LOCK_EX)
+        if _is_at(locked, partial):
+            break
+        os.close(locked)  # the other writer has renamed it
+    try:
+        if folder:
+            for left in partial.iterdir():  # by a killed run
+                shutil.rmtree(left) if left.is_dir() and not left.is_symlink() else left.unlink()
+        else:
+            os.truncate(locked, 0)
+        yield partial
+    except BaseException:
+        shutil.rmtree(partial, ignore_errors=True) if folder else partial.unlink(missing_ok=True)
+        raise
     finally:
-        partial.unlink(missing_ok=True)
+        os.close(locked)
+
+
+def _is_at(descriptor: int, path: Path) -> bool:
+    try:
+        return os.path.samestat(os.fstat(descriptor), os.lstat(path))
+    except FileNotFoundError:
+        return False
+
+
+@contextmanager
+def full_disk_named(path: Path) -> Iterator[None]:
+    """Raise an InputError that names what was to be written if the disk is full; some libraries do not tell."""
+    try:
+        yield
+    except (OSError, RuntimeError) as fault:
+        folder = next(each for each in path.absolute().parents if each.is_dir())
+        if getattr(fault, "errno", None) not in _FULL and shutil.disk_usage(folder).free > FEW_BYTES:
+            raise
+        words = f"cannot be written: no space left on the disk of {folder}"
+        raise InputError(path, words, "free some, or name a place on another") from fault
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Write a text in UTF-8, whole or not at all; what UTF-8 lacks, as in names of other encodings, is escaped."""
+    with whole_file(path) as partial:
+        partial.write_text(text, encoding="utf-8", errors="backslashreplace")
+
+
+def append_row(path: Path, row: Sequence[object], head: Sequence[object]) -> None:
+    """Add a row to a CSV, after the head if it is empty, whole or not at all; others may do so at the same time."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with full_disk_named(path), path.open("ab+", buffering=0) as file:
+        with suppress(OSError):  # a file system without locks
+            fcntl.flock(file, fcntl.LOCK_EX)
+        end = file.seek(0, os.SEEK_END)
+        file.seek(max(0, end - 1))
+        text = io.StringIO()
+        text.write("\n" * (file.read(1) not in (b"", b"\n")))
+        csv.writer(text, lineterminator="\n").writerows([row] if end else [head, row])
+        content = text.getvalue().encode()
+        try:
+            if file.write(content) != len(content):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        except OSError:
+            file.truncate(end)
+            raise
+
+
+def require_apart(options: Namespace, outputs: Iterable[str], also_read: Iterable[str | Path] = ()) -> None:
+    """Check before the work that a command can write its outputs, named as options, and reads none of them.
+
+    All that its other options name is read, and `also_read`, such as a default.
+    """
+    given = vars(options) | dict.fromkeys(outputs)
+    values = [each for value in given.values() for each in (value if isinstance(value, list) else [value])]
+    read = [each for each in values if isinstance(each, Path) or (isinstance(each, str) and os.path.isfile(each))]
+    require_outputs([path for name in outputs if (path := getattr(options, name))], [*read, *also_read])
 
 
 def require_outputs(outputs: Iterable[str | Path], inputs: Iterable[str | Path] = (), folders: bool = False) -> None:
-    """Check before the work that outputs can be written, and that none of them is an input; folders may be missing."""
+    """Check before the work that outputs can be written, and that none of them is an input; folders may be missing.
+
+    Of a folder that is read, only pages are replaced.
+    """
     taken = {Path(os.path.realpath(path)) for path in inputs}
+    read = [path for path in taken if path.is_dir()]
     for output in map(Path, outputs):
-        if (real := Path(os.path.realpath(output))) in taken:
+        real = Path(os.path.realpath(output))
+        is_read = real.exists() and real.suffix != PAGE and any(map(real.is_relative_to, read))
+        if real in taken or is_read:
             raise InputError(output, "is also an input or another output", "give each file its own name")
         taken.add(real)
         if real.exists() and not (real.is_dir() if folders else real.is_file()):  # a device would be replaced
@@ -124,21 +231,6 @@ def require_outputs(outputs: Iterable[str | Path], inputs: Iterable[str | Path] 
             raise InputError(
                 output, f"cannot be written: no permission to write to {existing}", "choose another folder"
             )
-
-
-@contextmanager
-def whole_folder(path: str | Path) -> Iterator[Path]:
-    """Yield a temporary folder beside `path`, which replaces `path` on success and is removed on failure."""
-    path = Path(path)
-    partial = path.with_name(f".{path.name}.partial")
-    shutil.rmtree(partial, ignore_errors=True)  # what a killed run left
-    partial.mkdir(parents=True)
-    try:
-        yield partial
-        shutil.rmtree(path, ignore_errors=True)
-        partial.replace(path)
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)
 
 
 def sha256_of_file(path: str | Path) -> str:

@@ -18,7 +18,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from gpca.io.files import require_outputs, sha256_of_file, whole_file
+from gpca.io.files import require_outputs, sha256_of_file, write_text
 from gpca.process.code_files import ROOT
 from gpca.process.processor import describe
 
@@ -65,8 +65,7 @@ def record_provenance(
         "libraries": versions,
     }
     for output in map(Path, outputs):
-        with whole_file(record_path(output)) as partial:
-            partial.write_text(json.dumps(record, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+        write_text(record_path(output), json.dumps(record, indent=1, sort_keys=True) + "\n")
 
 
 def record_path(path: Path) -> Path:

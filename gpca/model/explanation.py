@@ -13,7 +13,7 @@ import numpy as np
 
 from gpca.alignment.pose_error import displacements
 from gpca.causes.truth import FAILED, NOMINAL
-from gpca.io.files import whole_file
+from gpca.io.files import whole_file, write_text
 from gpca.model import page
 from gpca.model.diagnosis import ADVICE, CHECK, UNKNOWN, Diagnosis, FittingPose, Reenacted, plain
 from gpca.model.scene import Scene
@@ -130,8 +130,7 @@ class ExplainedRegistration:
 
     def save_html(self, path: str | Path, names: Mapping[str, str] | None = None) -> None:
         """Write :meth:`html` to a file."""
-        with whole_file(path) as partial:
-            partial.write_text(self.html(names), encoding="utf-8")
+        write_text(path, self.html(names))
 
     def _repr_html_(self) -> str:
         """Return the page for a notebook."""

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from gpca.errors import InputError
-from gpca.io.files import whole_file
+from gpca.io.files import write_text
 from gpca.jobs.provenance import RECORD
 
 NAME = "ro-crate-metadata.json"
@@ -36,8 +36,7 @@ def write_crate(folder: str | Path, run: str, sources: Iterable[str], seeds: Seq
         f"{', '.join(sources)}; seeds {', '.join(map(str, seeds))}."
     )
     document = crate(read_jobs(Path(folder)), f"GP-CA Bench: run {run}", description)
-    with whole_file(Path(folder, NAME)) as partial:
-        partial.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    write_text(Path(folder, NAME), json.dumps(document, indent=1, ensure_ascii=False) + "\n")
 
 
 def read_jobs(folder: Path) -> list[dict[str, Any]]:

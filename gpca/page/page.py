@@ -13,7 +13,7 @@ from pathlib import Path
 from gpca.alignment.icp import ICPSettings
 from gpca.causes.settings import CauseSettings
 from gpca.errors import InputError
-from gpca.io.files import whole_file
+from gpca.io.files import write_text
 from gpca.jobs.provenance import read_record, sha256_of_settings
 from gpca.model.scene import ASSETS
 from gpca.page.comparison import page_comparison
@@ -97,8 +97,7 @@ def write_page(folder: str | Path, run: FinishedRun) -> None:
         samples=samples,
         provenance=read_provenance(recorded + sample_files),
     )
-    with whole_file(folder / "index.html") as partial:
-        partial.write_text(text, encoding="utf-8")
+    write_text(folder / "index.html", text)
 
 
 def render(template: str = "index.html.jinja", **content) -> str:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from gpca.errors import InputError
-from gpca.io.files import whole_file
+from gpca.io.files import write_text
 from gpca.jobs.provenance import read_record
 from gpca.page.comparison import number_of, page_comparison
 from gpca.page.page import read_provenance, render
@@ -177,8 +177,7 @@ def write_comparison(
             for name in _shared(figures, titles)
         ],
     )
-    with whole_file(path) as partial:
-        partial.write_text(text, encoding="utf-8")
+    write_text(path, text)
 
 
 def _recorded(folder: Path) -> tuple[dict[str, dict[str, int]], dict[str, frozenset[str]], dict[tuple[str, ...], dict]]:

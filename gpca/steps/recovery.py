@@ -19,7 +19,7 @@ from gpca.frames.shots import Shot, best_viewpoint
 from gpca.frames.situations import REDRAWS, Shelf, Situation, Situations
 from gpca.io.arrays import save_arrays
 from gpca.io.csv_file import write_csv
-from gpca.io.files import Axes, whole_file
+from gpca.io.files import Axes, write_text
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.objects.camera import MeshScene, shade
@@ -94,8 +94,7 @@ def run(job: Job) -> None:
             means = replace(means, alarm=calibrated_alarm(fresh, reenactor, recovery["gate"]["false_alarms"]))
         content = summary(means, explainers)
         print(json.dumps(content), file=sys.stderr)
-        with whole_file(job.policy) as partial:
-            partial.write_text(json.dumps(content, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+        write_text(job.policy, json.dumps(content, indent=1, sort_keys=True) + "\n")
         episodes = find_episodes(tables["failures"], loop)
         rows, seconds = Loop(episodes, actions, explainers.explain, means, loop, axes, reenactor).run(
             recovery["policies"]

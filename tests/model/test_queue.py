@@ -1,5 +1,7 @@
 """The file of queued registrations, which grows."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 
@@ -37,3 +39,14 @@ def test_what_is_no_queue_or_of_another_model_is_refused(explained, registration
     add_to_queue(tmp_path / "queued.npz", *clouds, np.zeros((1, 4)), "a to b")
     with pytest.raises(InputError, match=r"queued.npz: is a queue of another model"):
         add_to_queue(tmp_path / "queued.npz", *clouds, np.zeros((1, 5)), "a to b")
+
+
+def test_two_that_queue_at_once_lose_nothing(explained, tmp_path):
+    clouds = explained.scene.aligned, explained.scene.target
+
+    def add(n):
+        return add_to_queue(tmp_path / "queued.npz", *clouds, np.zeros((1, 4)), f"scan{n}.ply to box.stl")
+
+    with ThreadPoolExecutor(4) as pool:
+        assert sorted(pool.map(add, range(12))) == list(range(1, 13))
+    assert len(set(Queue.load(tmp_path / "queued.npz").object_name)) == 12

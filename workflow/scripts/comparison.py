@@ -8,7 +8,7 @@ from gpca.comparison.values import cluster_draws, measured_on, read_results
 from gpca.comparison.verdicts import Tolerance, compare
 from gpca.experiments import reading_words
 from gpca.io.csv_file import write_csv
-from gpca.io.files import whole_file
+from gpca.io.files import write_text
 from gpca.jobs.job import workflow_script
 
 with workflow_script(snakemake):
@@ -33,5 +33,4 @@ with workflow_script(snakemake):
     out = snakemake.output
     for frame, path in ((comparison, out.csv), (claims, out.claims), (judged, out.readings)):
         write_csv(path, frame, form=None)
-    with whole_file(snakemake.output.md) as partial:
-        partial.write_text(comparison_markdown(comparison, tolerances), encoding="utf-8")
+    write_text(snakemake.output.md, comparison_markdown(comparison, tolerances))

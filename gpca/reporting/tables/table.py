@@ -12,7 +12,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from gpca.io.files import whole_file
+from gpca.io.files import whole_file, write_text
 
 EMPTY = "–"  # where there is no number
 LEAST_SEEDS = 3  # A mean over fewer has no interval: that of two spans everything, however near they lie.
@@ -98,8 +98,7 @@ class Table:
         """Write ``{stem}.csv``, ``.md``, ``.tex`` and, for the page, ``.json``: each whole or not at all."""
         page = json.dumps(self.printed(), indent=1, ensure_ascii=False) + "\n"
         for suffix, text in (("md", self.markdown()), ("tex", self.latex()), ("json", page)):
-            with whole_file(f"{stem}.{suffix}") as partial:
-                partial.write_text(text, encoding="utf-8")
+            write_text(f"{stem}.{suffix}", text)
         with whole_file(f"{stem}.csv") as partial, partial.open("w", newline="", encoding="utf-8") as file:
             csv.writer(file, lineterminator="\n").writerows(self.records())
 
