@@ -79,8 +79,8 @@ def run_explain(options: Namespace) -> int:
     if path is not None:
         require_model(path)
     rows = from_rows(options) if options.pairs else []
-    of_rows = [options.pairs.parent / name for _, row in rows for key in FILES if (name := row.get(key))]
-    require_apart(options, ["html", "png", "queue", "save_pose"], [*filter(None, [path]), *of_rows])
+    row_files = [options.pairs.parent / name for _, row in rows for key in FILES if (name := row.get(key))]
+    require_apart(options, ["html", "png", "queue", "save_pose"], [*filter(None, [path]), *row_files])
     inputs = [] if options.pairs else from_words(options)
     for each in inputs:
         each.require_formats()
