@@ -124,20 +124,6 @@ def decide(judge: ResultJudge, level: Calibrated, proposals: Proposals, toleranc
     return Verdict(NOT_REPAIRED, 0, (), probability_n)
 
 
-def calibrated_repair(probability_N: np.ndarray, off_N: np.ndarray, wrong: float = WRONG) -> float | None:
-    """Return the probability below which at most the share `wrong` of repaired poses is off; None for too few samples.
-
-    The samples are the likeliest proposals for registrations that were called failed, of families that the judge did
-    not learn; a new one may be off, and counts as such.
-    """
-    order = np.argsort(probability_N, kind="stable")
-    called_N = np.arange(2, len(order) + 2)
-    allowed_N = (np.cumsum(off_N[order]) + 1) / called_N <= wrong
-    last_N = np.append(np.diff(probability_N[order]) > 0, True)  # of equal probabilities, all are called so
-    kept = np.flatnonzero(allowed_N & last_N)
-    return float(np.nextafter(probability_N[order][kept[-1]], 1)) if len(kept) else None
-
-
 def inliers(points: np.ndarray, surface: ModelSurface, T_K: np.ndarray) -> np.ndarray:
     """Return which points (K, N) are no outliers at poses (K, 4, 4); all, where next to none would be left."""
     fits = Mixture(surface.points, surface.spacing / 2).fit(points, T_K, LAST_ITERATIONS, moving=False)

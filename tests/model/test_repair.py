@@ -13,7 +13,6 @@ from gpca.model.repair import (
     SEVERAL,
     Proposals,
     by_icp,
-    calibrated_repair,
     decide,
     difference,
     measured,
@@ -74,18 +73,6 @@ def test_the_alarm_and_the_promise_about_repairs_are_stricter_than_the_threshold
     between = calibrated_at([stricter, Calibrated(0.05, 0.4, guarantee, 0.02)], 0.04)
     assert between.repaired_below == 0.01
     assert calibrated_at([level, stricter], 0.03).repaired_below is None
-
-
-def test_at_most_a_share_of_repaired_poses_is_off():
-    random = np.random.default_rng(0)
-    probability_N = random.uniform(size=4000)
-    off_N = random.uniform(size=4000) < probability_N
-    below = calibrated_repair(probability_N[:2000], off_N[:2000])
-    new_N = probability_N[2000:] < below
-    assert off_N[2000:][new_N].mean() < 0.07
-    assert 0.02 < below < 0.15
-    assert calibrated_repair(probability_N[:10], off_N[:10]) is None
-    assert calibrated_repair(np.full(100, 0.3), np.arange(100) < 50) is None
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,35 @@
+"""Which poses are accepted: those below a limit of a score, so that few of the accepted ones are wrong."""
+
+from __future__ import annotations
+
+from statistics import NormalDist
+
+import numpy as np
+
+WRONG = 0.05  # largest share of wrong poses among those that are accepted
+CONFIDENCE = 0.9
+
+
+def accepted_below(
+    score_N: np.ndarray, wrong_N: np.ndarray, family_N: np.ndarray, risk: float = WRONG, confidence: float = CONFIDENCE
+) -> float | None:
+    """Return the largest score below which at most the share `risk` of the poses is wrong; None if there is none.
+
+    The share is that of the accepted poses, not of all. Its upper bound, one-sided at this confidence, is what stays
+    below the risk: families are drawn as wholes (linearized ratio of sums), and one more pose that is accepted and
+    wrong is counted, so that a few right poses are not enough. A score that is not finite is never accepted.
+    """
+    score_N, wrong_N = np.asarray(score_N, float), np.asarray(wrong_N, bool)
+    rows = np.flatnonzero(np.isfinite(score_N))
+    rows = rows[np.argsort(score_N[rows], kind="stable")]
+    score_n, wrong_n = score_N[rows], wrong_N[rows]
+    families, number_n = np.unique(np.asarray(family_N)[rows], return_inverse=True)
+    own_n_F = number_n[:, None] == np.arange(len(families))
+    accepted_n_F, off_n_F = np.cumsum(own_n_F, axis=0), np.cumsum(own_n_F & wrong_n[:, None], axis=0)
+    total_n, off_n, reached_n = accepted_n_F.sum(axis=1), off_n_F.sum(axis=1), (accepted_n_F > 0).sum(axis=1)
+    squares_n = np.square(off_n_F - (off_n / total_n)[:, None] * accepted_n_F).sum(axis=1)
+    spread_n = np.sqrt(np.maximum(reached_n, 2) / np.maximum(reached_n - 1, 1) * squares_n) / total_n
+    bound_n = (off_n + 1) / (total_n + 1) + NormalDist().inv_cdf(confidence) * spread_n
+    last_n = np.append(np.diff(score_n) > 0, np.ones(len(score_n[:1]), bool))  # equal scores are accepted together
+    kept = np.flatnonzero((bound_n <= risk) & last_n)
+    return float(np.nextafter(score_n[kept[-1]], np.inf)) if len(kept) else None
