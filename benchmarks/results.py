@@ -23,6 +23,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from gpca.causes.dataset import Causes  # noqa: E402
+from gpca.causes.judged import ranking  # noqa: E402
 from gpca.evaluation.conformal import ALARM, GOOD, calibrate_alarm  # noqa: E402
 from gpca.evaluation.intervals import Estimate, interval, pigeonhole_weights, weighted_mean  # noqa: E402
 from gpca.model.diagnoser import TrainingSet  # noqa: E402
@@ -118,8 +119,8 @@ def measured(
         score_n, call_n = score_N[rows], call_N[rows]
         shares = {"false_alarms": (call_n == ALARM, ~off_N), "missed": (call_n == GOOD, off_N)}
         rows_of[name] = {
-            "auroc": interval(auroc(score_n, off_N, weights_B_N)),
-            "auroc_clear": interval(auroc(score_n, off_N, weights_B_N * clear_N)),
+            "auroc": interval(ranking(score_n, off_N, weights_B_N)["area"]),
+            "auroc_clear": interval(ranking(score_n, off_N, weights_B_N * clear_N)["area"]),
         } | {
             measure: interval(
                 weighted_mean(wrong_n[among_n].astype(float), weights_B_N[:, among_n]), weights_B_N[1:, among_n]
@@ -133,19 +134,6 @@ def measured(
         )
     own = {measure: round(estimate.value, 4) for measure, estimate in rows_of[JUDGE].items()}
     return {prefix + name: value for name, value in (counts | own).items()}
-
-
-def auroc(score_N: np.ndarray, off_N: np.ndarray, weights_B_N: np.ndarray) -> np.ndarray:
-    """Return the AUROC (B,) by weights of the samples."""
-    order = np.argsort(score_N, kind="stable")
-    _, tie_N = np.unique(score_N[order], return_inverse=True)
-    good_B_N, bad_B_N = (weights_B_N[:, order] * mask_N[order] for mask_N in (~off_N, off_N))
-    good_B_K, bad_B_K = (
-        np.stack([np.bincount(tie_N, weights_N) for weights_N in part_B_N]) for part_B_N in (good_B_N, bad_B_N)
-    )
-    below_B_K = np.cumsum(good_B_K, axis=1) - 0.5 * good_B_K
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return (bad_B_K * below_B_K).sum(axis=1) / (good_B_K.sum(axis=1) * bad_B_K.sum(axis=1))
 
 
 def cell(estimate: Estimate) -> str:

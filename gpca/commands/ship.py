@@ -11,52 +11,25 @@ from pathlib import Path
 from string import Template
 from tempfile import TemporaryDirectory
 from textwrap import fill
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
-from gpca.causes.judged import CEILING, RECALL
 from gpca.errors import InputError
-from gpca.evaluation.measures import POOLED, read_clustered
 from gpca.io.files import require_apart, whole_file, write_text
 from gpca.io.structured_text import load_own_yaml, read_json
 from gpca.jobs.provenance import record_path
+from gpca.model.diagnoser import ENDS
 from gpca.model.file import VERSION, Model
 from gpca.objects.canonical import ObjectClouds
 from gpca.objects.sizes import LARGEST_DIAMETER_M, SMALLEST_DIAMETER_M
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.sheet import where
 
-if TYPE_CHECKING:
-    import pandas as pd
-
-COMMITTEE = "reenact_committee"  # explainer with the features of the model's diagnosis
-EXPLAINERS = {
-    COMMITTEE: "a committee on what this model reads",
-    "reenact": "the re-enactment without learning",
-    CEILING: "the truth, measured again",
-}
-HELD_OUT = {  # by the mean error over the starts
-    "balanced_accuracy": "balanced accuracy",
-    "dominant_accuracy": "dominant cause",
+HELD_OUT = {  # measures of starts and results
     "auroc_failed": "AUROC of failed",
     "false_alarms": "good ones called failed",
-    "missed": "failures called nominal",
-    "samples": "samples",
-    "families": "families",
+    "missed": "failures called good",
 }
-HELD_OUT_RESULTS = {  # by the errors of the results
-    "result_auroc_failed": "AUROC of failed",
-    "result_false_alarms": "good ones called failed",
-    "result_missed": "failures called nominal",
-    "result_good": "good ones",
-    "result_samples": "samples",
-}
-MEASURES = {
-    "balanced_accuracy": "balanced accuracy",
-    "dominant_accuracy": "dominant cause",
-    "auroc_failed": "AUROC of failed",
-    "false_alarm_rate": "false alarms",
-    "average_precision": "mean average precision",
-}
+STARTS = HELD_OUT | {"balanced_accuracy": "balanced accuracy", "dominant_accuracy": "dominant cause"}
+COUNTS = ("good", "samples", "families")
 LARGEST_BYTES = 8 * 10**6  # of the model file in every installation
 LICENSES = Path(__file__).with_name("licenses.yaml")
 CARD = Path(__file__).with_name("card.md")  # template
@@ -79,12 +52,12 @@ class Source(NamedTuple):
     name: str
     title: str
     diagnosed: bool
-    objects: int
+    objects: int | str  # their number; a dash without the file of the objects
     licenses: list[License]
 
 
 def _sources(model: Path, record: Mapping, title: str) -> Iterator[Source]:
-    """Yield the training objects of a model, read from ``objects/`` of its run, in the order of the record."""
+    """Yield the training objects of a model, in the order of its record, by the records in ``objects/`` of its run."""
     files = [match.groups() for path in record["inputs_sha256"] if (match := _TRAINING_FILE.search(f"/{path}"))]
     if not files:
         raise InputError(record_path(model), "lists nothing that a model learns from", REMEDY)
@@ -100,7 +73,8 @@ def _sources(model: Path, record: Mapping, title: str) -> Iterator[Source]:
             url for each in downloads for url in each.get("urls") or [each["url"]]
         ]
         licenses = list(dict.fromkeys(license for origin in origins for license in licenses_of(origin, objects)))
-        yield Source(name, entry["title"], kind == "model_causes", len(ObjectClouds.load(objects)), licenses)
+        number = len(ObjectClouds.load(objects)) if objects.is_file() else "–"
+        yield Source(name, entry["title"], kind == "model_causes", number, licenses)
 
 
 def licenses_of(origin: str, objects: Path) -> list[License]:
@@ -124,9 +98,7 @@ def _provenance(path: Path) -> dict:
     return record
 
 
-def card(
-    name: str, content: bytes, model: Model, record: Mapping, sources: Sequence[Source], scores: pd.DataFrame
-) -> str:
+def card(name: str, content: bytes, model: Model, record: Mapping, sources: Sequence[Source]) -> str:
     """Return the card in Markdown, the template with its fields; equal inputs give equal text."""
     diagnoser, code = model.diagnoser, record["code"]
     try:
@@ -154,14 +126,14 @@ def card(
         "percent": "\u00a0%",
         "samples": diagnoser.classifier.samples,
         "learned": len(model.gpc.learned_N_d),
-        "recall": f"{100 * RECALL:g}",
         "file": _table(["", ""], file.items()),
         "training": _table(["objects", "number", "train"], training),
         "licenses": _table(["dataset", "license", "source of this information", "part of"], licenses),
-        "held_out": _held_out(diagnoser.held_out, HELD_OUT),
-        "held_out_results": _held_out(diagnoser.held_out, HELD_OUT_RESULTS),
+        "held_out": _held_out("", {"starts": diagnoser.held_out}, STARTS),
+        "held_out_results": _held_out(
+            "tolerance", {f"{100 * level.tolerance:g} %": level.held_out for level in diagnoser.levels}, HELD_OUT
+        ),
         "changes": "\n".join(f"- `{key}: {json.dumps(value, sort_keys=True)}`" for key, value in changes) or "- none",
-        "scores": _scores(sources, scores),
     }
     paragraphs = []
     for paragraph in CARD.read_text(encoding="utf-8").strip().split("\n\n"):
@@ -176,26 +148,20 @@ def card(
     return "\n\n".join(paragraphs) + "\n"
 
 
-def _held_out(held_out: Mapping[str, float], measures: Mapping[str, str]) -> str:
-    values = [held_out[measure] for measure in measures]
-    return _table([*measures.values()], [[f"{value:.0f}" if value >= 2 else f"{value:.3f}" for value in values]])
+def _held_out(head: str, rows: Mapping[str, Mapping[str, float]], measures: Mapping[str, str]) -> str:
+    """Return a table of measures with the intervals that the model has."""
 
+    def cell(row: Mapping[str, float], name: str) -> str:
+        if name not in row:
+            return "–"
+        low, high = (row.get(name + end) for end in ENDS)
+        return f"{row[name]:.3f}" + ("" if low is None or high is None else f" ({low:.3f} to {high:.3f})")
 
-def _scores(sources: Sequence[Source], scores: pd.DataFrame) -> str:
-    titles = {source.name: source.title for source in sources if source.diagnosed} | {POOLED: "all together"}
-    rows, committees = [], 0
-    for source, title in titles.items():
-        for explainer, words in EXPLAINERS.items():
-            metrics = where(scores, {"source": source, "method": explainer, "against": ""}).set_index("metric")
-            if len(metrics):
-                committees += explainer == COMMITTEE
-                samples, seeds = metrics["samples"].reindex(list(MEASURES)).dropna(), metrics["seeds"].iloc[0]
-                counts = " to ".join(f"{count:.0f}" for count in sorted({samples.min(), samples.max()}))
-                each = {name: f"{row.value:.3f} ({row.low:.3f} to {row.high:.3f})" for name, row in metrics.iterrows()}
-                rows.append((title, words, *(each.get(name, "–") for name in MEASURES), f"{counts} ({seeds:.0f})"))
-    if not committees:
-        raise InputError("cause_intervals.csv", f"has no scores of {COMMITTEE}", "switch it on in diagnosis.explainers")
-    return _table(["objects", "explainer", *MEASURES.values(), "samples (seeds)"], rows)
+    lines = [
+        (name, *(cell(row, measure) for measure in measures), *(f"{row[n]:.0f}" if n in row else "–" for n in COUNTS))
+        for name, row in rows.items()
+    ]
+    return _table([head, *measures.values(), *COUNTS], lines)
 
 
 def _limits(model: Model, settings: Mapping) -> dict[str, object]:
@@ -231,16 +197,19 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 def add_ship_arguments(parser: ArgumentParser) -> None:
     add = parser.add_argument
-    add("--model", required=True, type=Path, help="model in the folder of its run, such as results/full/model.pt")
+    add(
+        "--model",
+        required=True,
+        type=Path,
+        help="model of a run, with the records of its folder, such as results/full/model.pt",
+    )
     add("--out", required=True, type=Path, help="the model to ship, such as gpca/model/shipped.pt")
     add("--card", required=True, type=Path, help="its card, such as gpca/model/shipped.md")
 
 
 def run_ship(options: Namespace) -> None:
     """Write both files or neither; the same run gives the same bytes."""
-    scores = options.model.with_name("cause_intervals.csv")
-    made = [scores, record_path(options.model), options.model.with_name("objects")]
-    require_apart(options, ["out", "card"], made)
+    require_apart(options, ["out", "card"], [record_path(options.model), options.model.with_name("objects")])
     model = Model.load(options.model)
     if model.stand_in:
         raise InputError(options.model, "was trained on objects that the package drew", "ship a model of real objects")
@@ -256,7 +225,7 @@ def run_ship(options: Namespace) -> None:
         sources = list(_sources(options.model, record, model.title))
     except (LookupError, TypeError, AttributeError) as fault:
         raise InputError(options.model.parent / "objects", f"its provenance is incomplete ({fault})", REMEDY) from fault
-    text = card(options.out.name, content, model, record, sources, read_clustered(scores))
+    text = card(options.out.name, content, model, record, sources)
     with whole_file(options.out) as partial:
         partial.write_bytes(content)
     write_text(options.card, text)

@@ -21,6 +21,7 @@ from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.evaluation.conformal import highest_level
+from gpca.evaluation.intervals import interval, pigeonhole_weights, weighted_mean
 from gpca.explainers.pair_classifier import Judgment, PairClassifier
 from gpca.guarantee.guarantee import SEVERAL, Guarantee, calibrate
 from gpca.io.container import Container, array
@@ -50,6 +51,7 @@ MOST_REENACTED = 512  # points of a user's cloud; twice as many take twice the t
 FOLDS = 3  # of the families
 LEVEL = 0.9  # probability that a set of states contains the true one
 MISSED = 0.05  # largest probability that a failure is called good
+ENDS = ("_low", "_high")  # of the interval of a measure
 
 
 @dataclass(frozen=True)
@@ -267,8 +269,6 @@ def learn(
         if (training.shown_error_N <= tolerance).any()
     )
     levels = tuple(calibrated_levels) or UNCALIBRATED
-    at_default = calibrated_at(levels, DEFAULT_TOLERANCE)
-    off_N, result_N = training.shown_error_N > DEFAULT_TOLERANCE, result_T_N[TOLERANCES.index(DEFAULT_TOLERANCE)]
     diagnoser = Diagnoser(
         classifier=training.subset(clear_N).classifier(gpc, *axes),
         start_threshold=start_threshold,
@@ -278,8 +278,7 @@ def learn(
         runs=causes.runs(),
         moved=causes.moved,
         reenactment=reenactment,
-        held_out=measured(training.subset(clear_N), judged.subset(clear_N), start_threshold)
-        | measured_results(off_N, result_N, at_default.threshold),
+        held_out=measured(training.subset(clear_N), judged.subset(clear_N), start_threshold),
     )
     return diagnoser, judged.bald_N[clear_N & ~nominal_N]
 
@@ -322,7 +321,9 @@ def calibrated(
         for families in (family_N, None)
     )
     guarantee = Guarantee(by_family.state_sets, single.failure_alarm, by_family.samples, by_family.families)
-    return Calibrated(tolerance, threshold, guarantee)
+    off_N = training.shown_error_N > tolerance
+    held_out = alarms(off_N, result_N, threshold, training.family_N)
+    return Calibrated(tolerance, threshold, guarantee, held_out=held_out)
 
 
 def measured(training: TrainingSet, judged: Judgment, threshold: float) -> dict[str, float]:
@@ -333,30 +334,28 @@ def measured(training: TrainingSet, judged: Judgment, threshold: float) -> dict[
     present = [label for label in LABELS if (training.label_N == label).any()]
     first_N = np.array(LABELS[1:])[judged.causes_N_3.argmax(axis=1)]
     return {
-        "samples": float(len(failed_N)),
-        "families": float(len(np.unique(training.family_N))),
         "balanced_accuracy": float(np.mean([right_N[training.label_N == label].mean() for label in present])),
         "dominant_accuracy": float((first_N == training.label_N)[failed_N].mean()) if failed_N.any() else 0.0,
-        **alarms(failed_N, judged.failure_N, threshold),
+        **alarms(failed_N, judged.failure_N, threshold, training.family_N),
     }
 
 
-def measured_results(off_N: np.ndarray, result_N: np.ndarray, threshold: float) -> dict[str, float]:
-    """The same by the errors of the results themselves, of all registrations."""
-    counts = {"result_samples": float(len(off_N)), "result_good": float((~off_N).sum())}
-    return counts | {f"result_{name}": value for name, value in alarms(off_N, result_N, threshold).items()}
+def alarms(failed_N: np.ndarray, probability_N: np.ndarray, threshold: float, family_N: np.ndarray) -> dict[str, float]:
+    """Return how well a probability tells failures, and what an alarm from a threshold on gets wrong.
 
+    Each measure that has a value has the ends of its 95 % interval over families beside it.
+    """
+    from gpca.causes.judged import ranking
 
-def alarms(failed_N: np.ndarray, probability_N: np.ndarray, threshold: float) -> dict[str, float]:
-    """Return how well a probability tells failures, and what an alarm from a threshold on gets wrong."""
-    from sklearn.metrics import roc_auc_score
-
-    alarm_N, both = probability_N >= threshold, failed_N.any() and not failed_N.all()
-    return {
-        "auroc_failed": float(roc_auc_score(failed_N, probability_N)) if both else 0.5,
-        "false_alarms": float(alarm_N[~failed_N].mean()) if not failed_N.all() else 0.0,
-        "missed": float((~alarm_N)[failed_N].mean()) if failed_N.any() else 0.0,
-    }
+    weights_B_N = np.vstack([np.ones(len(family_N)), pigeonhole_weights(generator("held out"), family_N)])
+    alarm_N = probability_N >= threshold
+    estimates = {"auroc_failed": interval(ranking(probability_N, failed_N, weights_B_N)["area"])}
+    for name, wrong_N, among_N in (("false_alarms", alarm_N, ~failed_N), ("missed", ~alarm_N, failed_N)):
+        weights_B_n = weights_B_N[:, among_N]
+        estimates[name] = interval(weighted_mean(wrong_N[among_N], weights_B_n), weights_B_n[1:])
+    counts = {"samples": len(family_N), "good": (~failed_N).sum(), "families": len(np.unique(family_N))}
+    values = {name + end: x for name, part in estimates.items() for end, x in zip(("", *ENDS), part, strict=True)}
+    return {name: float(value) for name, value in (counts | values).items() if np.isfinite(value)}
 
 
 def threshold_of(failure_N: np.ndarray, false_alarms: float) -> float:

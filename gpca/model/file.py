@@ -226,7 +226,8 @@ def _require_diagnoser(state: Mapping) -> None:
             sets = Guarantee.from_dict(level["guarantee"]).state_sets
             same = sets.states == STATES and 0 < sets.level < 1 and sets.nonconformity in get_args(Nonconformity)
             _require(same, "its guarantee is of different states, or of none")
-    for name, value in state["held_out"].items():
+    measures = [state["held_out"], *(level.get("held_out", {}) for level in levels)]
+    for name, value in (item for each in measures for item in each.items()):
         is_measure = type(name) is str and name.isidentifier() and type(value) is float and 0 <= value < MOST_DRAWS
         _require(is_measure, f"held_out: {str(name)[:40]!r} is not the name of a measure with a value")
 

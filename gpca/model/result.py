@@ -6,7 +6,7 @@ It is a logistic regression on a few numbers that are relative to the tolerance,
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.special import expit, logit
@@ -107,6 +107,7 @@ class Calibrated:
     threshold: float  # probability from which a result is called failed
     guarantee: Guarantee | None = None  # sets of states and alarm
     repaired_below: float | None = None  # probability below which a repaired pose is called so, with a promise
+    held_out: Mapping[str, float] = field(default_factory=dict)  # measures of accuracy on unseen families of shapes
 
     @property
     def good_below(self) -> float:
@@ -118,14 +119,14 @@ class Calibrated:
 
     def state(self) -> dict[str, object]:
         """Return plain values for :meth:`from_state`."""
-        plain = {"tolerance": self.tolerance, "threshold": self.threshold, "repaired_below": self.repaired_below}
-        return plain | {"guarantee": self.guarantee and self.guarantee.to_dict()}
+        guarantee = self.guarantee and self.guarantee.to_dict()
+        return vars(self) | {"guarantee": guarantee, "held_out": dict(self.held_out)}
 
     @classmethod
     def from_state(cls, state: Mapping) -> Calibrated:
         """Return what :meth:`state` holds."""
         guarantee = None if state["guarantee"] is None else Guarantee.from_dict(state["guarantee"])
-        return cls(state["tolerance"], state["threshold"], guarantee, state.get("repaired_below"))
+        return cls(**{**state, "guarantee": guarantee})
 
 
 UNCALIBRATED = (Calibrated(DEFAULT_TOLERANCE, EVEN),)

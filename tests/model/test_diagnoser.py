@@ -168,9 +168,10 @@ def test_what_is_promised_and_measured_is_of_families_that_were_not_learned(lear
     assert full.held_out["families"] == 4
     assert full.held_out["auroc_failed"] == 1
     assert full.held_out["false_alarms"] <= 0.05
-    assert full.held_out["result_auroc_failed"] > 0.99
-    assert full.held_out["result_false_alarms"] <= 0.05
-    assert full.held_out["result_good"] == 20
+    [measured] = [level.held_out for level in full.levels if level.tolerance == 0.03]
+    assert 0.99 < measured["auroc_failed_low"] <= measured["auroc_failed"] <= measured["auroc_failed_high"] <= 1
+    assert measured["false_alarms_low"] <= measured["false_alarms"] <= 0.05 < measured["false_alarms_high"]
+    assert measured["good"] == 20
     # Four families are too few for a promise of 0.9 family by family, so registrations are counted.
     judged, result_T_N = judged_unseen(given, SETTINGS, "tiny", 0)
     for level, result_N in zip(full.levels, result_T_N, strict=True):

@@ -167,6 +167,7 @@ CONTENTS = {
     "a guarantee of NaN": level("guarantee/sets/level", NAN),
     "a guarantee of nothing": level("guarantee", {"sets": 1}),
     "measures of text": put("diagnoser/held_out/samples", "many"),
+    "measures of results of text": level("held_out", {"samples": "many"}),
     "1e9 points of a description": put("diagnoser/points", HUGE),
     "a cause without a classifier": put("diagnoser/classifier/causes", lambda causes: causes[:2]),
     "states in another order": put("diagnoser/classifier/failure/classes", ["failed", "nominal"]),
