@@ -9,6 +9,7 @@ _EXPORTS = {
     "explain_scans": "gpca.model.scan_explainer",
     "judge": "gpca.model.explainer",
     "load": "gpca.tracks.loading",
+    "repair": "gpca.model.explainer",
 }
 __all__ = ["__version__", *_EXPORTS]
 

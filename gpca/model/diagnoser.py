@@ -124,10 +124,8 @@ class Diagnoser:
         )
         return diagnosis, enactments
 
-    def measured(
-        self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray, register: bool = True
-    ) -> tuple[np.ndarray, Evidence, Reenacted, list[Enactment]]:
-        """Return the features (F,) of the pair and other starts, what is read of the result, and its re-enactment."""
+    def pair(self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray, register: bool = True) -> ObservedPair:
+        """Return what is drawn of the clouds, with registrations from other starts; see :meth:`diagnose`."""
         observed, model = (
             cloud[generator("diagnosis", role).permutation(len(cloud))[: self.points]]
             for role, cloud in (("observed", observed), ("model", model))
@@ -139,13 +137,19 @@ class Diagnoser:
         if not register:
             T_n[:1], fitness_n[:1], rmse_n[:1] = icp.register(observed, starts_n[:1], max_iterations=0)
         T_back, points = inverse(T_n[0]), transform(T_n[0], observed)
-        pair = ObservedPair(points, model, T_back, T_n @ T_back, fitness_n, rmse_n, axes=("diagnosis",))
-        surface = ModelSurface(model)
+        return ObservedPair(points, model, T_back, T_n @ T_back, fitness_n, rmse_n, axes=("diagnosis",))
+
+    def measured(
+        self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray, register: bool = True
+    ) -> tuple[np.ndarray, Evidence, Reenacted, list[Enactment]]:
+        """Return the features (F,) of the pair and other starts, what is read of the result, and its re-enactment."""
+        pair = self.pair(observed, model, T_icp, register)
+        surface = ModelSurface(pair.model)
         enactments = reenact(pair, self.reenactment, self.truth, surface)
         row = row_of(enactments, pair, self.reenactment, self.truth)
         reenacted = Reenacted.of(enactments, row["weight"][: len(enactments)], T_icp, surface)
         distance_K = surface.errors(T_icp @ inverses(row["T_model_observed"]))
-        evidence = Evidence(distance_K[None], row["weight"][None], rmse_n[:1], fitness_n[:1])
+        evidence = Evidence(distance_K[None], row["weight"][None], pair.inlier_rmse_n[:1], pair.fitness_n[:1])
         return reenactment_features(Reenactments.of_rows([row], self.truth))[0], evidence, reenacted, enactments
 
     def state(self) -> dict[str, object]:

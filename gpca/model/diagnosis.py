@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -33,6 +33,7 @@ ALONG_DEG = 15.0  # largest angle between a rotation axis and an axis of the tar
 SMALL_TURN_DEG = 3.0  # smaller rotations are not mentioned
 CHECK = "check"  # action for a pair whose scores mean nothing
 RERUN = "rerun"  # action where the re-enactment knows a better pose
+TAKE = "take"  # action where a repaired pose takes the place of the registered one
 REFINE = "refine"  # action for a given pose from which a registration would succeed
 SURE = 0.5  # probability of a pose from which to rerun from it
 ADVICE = {  # per branch of the policy
@@ -42,6 +43,7 @@ ADVICE = {  # per branch of the policy
     "denoise": "filter and check the sensor",
     CHECK: "check what was given",
     RERUN: "rerun from pose 1",
+    TAKE: "take the repaired pose",
     REFINE: "register from this pose",
     QUEUE: "queue for labeling, so that the cause can be learned",
 }
@@ -119,9 +121,10 @@ class FittingPose:
     error: float  # v̂, mean error of re-enacted registrations if this pose is true
 
     @classmethod
-    def of(cls, enactment: Enactment, probability: float, T_result: np.ndarray, surface: ModelSurface) -> FittingPose:
-        """Compare the hypothesis of a re-enactment with the registration's result."""
-        T = enactment.hypothesis.T
+    def of(
+        cls, T: np.ndarray, probability: float, error: float, T_result: np.ndarray, surface: ModelSurface, **more: Any
+    ) -> Self:
+        """Compare a hypothesis with the registration's result."""
         from_result = T @ inverse(T_result)
         # Among the motions from the result to this pose that are equivalent by symmetry, take the smallest rotation.
         least = from_result.copy()
@@ -138,8 +141,14 @@ class FittingPose:
             turn_deg=float(np.rad2deg(angle)),
             axis=tuple(axis_3.tolist()),
             shift=float(np.sqrt(np.square(from_result[:3, 3]).sum())),
-            error=float(enactment.error_8[ALL]),
+            error=error,
+            **more,
         )
+
+    def outside(self, frame: CanonicalFrame, T_target_source_init: np.ndarray) -> Self:
+        """Convert to the user's frame and unit of length, in which the initial pose is given."""
+        T = frame.pose_outside(self.T_target_source) @ T_target_source_init
+        return replace(self, T_target_source=T, **in_unit_of(frame, self, "apart", "shift", "error"))
 
     def words(self, unit: str, fits: str) -> str:
         """Describe the pose relative to the result, after the verb `fits`."""
@@ -149,6 +158,11 @@ class FittingPose:
             return f"{fits} moved by {in_decimals(self.shift)} {unit}"
         turn = f"turned by {self.turn_deg:.0f}° about {axis_in_words(self.axis)}"
         return f"{fits} {turn}, {in_decimals(self.shift)} {unit} away"
+
+
+def in_unit_of(frame: CanonicalFrame, values: Any, *names: str) -> dict[str, Any]:
+    """Return these lengths, in diameters, in the user's unit."""
+    return {name: getattr(values, name) * frame.diameter for name in names}
 
 
 def axis_in_words(axis: Sequence[float]) -> str:
@@ -188,7 +202,7 @@ class Reenacted:
             outliers=severity["outliers"],
             missing=severity["crop"],
             poses=tuple(
-                FittingPose.of(enactment, float(weight), T_result, surface)
+                FittingPose.of(enactment.hypothesis.T, float(weight), float(enactment.error_8[ALL]), T_result, surface)
                 for enactment, weight in zip(enactments, weight_k, strict=True)
             ),
         )
@@ -201,13 +215,9 @@ class Reenacted:
 
     def outside(self, frame: CanonicalFrame, T_target_source_init: np.ndarray) -> Reenacted:
         """Convert to the user's frame and unit of length, in which the initial pose is given."""
-        poses, unit = [], frame.diameter
-        for pose in self.poses:
-            T = frame.pose_outside(pose.T_target_source) @ T_target_source_init
-            lengths = {name: getattr(pose, name) * unit for name in ("apart", "shift", "error")}
-            poses.append(replace(pose, T_target_source=T, **lengths))
-        effects = {cause: effect * unit for cause, effect in self.effects.items()}
-        return replace(self, error=self.error * unit, effects=effects, noise=self.noise * unit, poses=tuple(poses))
+        effects = {cause: effect * frame.diameter for cause, effect in self.effects.items()}
+        poses = tuple(pose.outside(frame, T_target_source_init) for pose in self.poses)
+        return replace(self, effects=effects, poses=poses, **in_unit_of(frame, self, "error", "noise"))
 
     def as_dict(self) -> dict[str, object]:
         """Values for JSON."""
@@ -283,8 +293,7 @@ class Diagnosis:
     def outside(self, frame: CanonicalFrame, T_target_source_init: np.ndarray) -> Diagnosis:
         """Convert from the target's canonical frame to the user's frame and unit of length."""
         reenacted = self.reenacted.outside(frame, T_target_source_init)
-        lengths = {name: getattr(self, name) * frame.diameter for name in ("tolerance", "expected_error")}
-        return replace(self, **lengths, reenacted=reenacted)
+        return replace(self, **in_unit_of(frame, self, "tolerance", "expected_error"), reenacted=reenacted)
 
     def as_dict(self) -> dict[str, object]:
         """Values for JSON."""

@@ -23,10 +23,12 @@ from gpca.classifier.scores import entropy
 from gpca.errors import InputError
 from gpca.model.clouds import Clouds, voids_of
 from gpca.model.diagnoser import QUICK_HYPOTHESES, QUICK_POINTS
-from gpca.model.diagnosis import CHECK, REFINE, RERUN, Diagnosis
+from gpca.model.diagnosis import CHECK, REFINE, RERUN, TAKE, Diagnosis
 from gpca.model.explanation import GIVEN, Explanation, Motion, PoseSpread
 from gpca.model.file import Model
 from gpca.model.location import model_path
+from gpca.model.repair import REPAIRED
+from gpca.model.repaired import Repair
 from gpca.model.scene import Scene
 from gpca.model.tolerance import DEFAULT as DEFAULT_TOLERANCE
 from gpca.model.tolerance import Tolerance
@@ -81,6 +83,7 @@ class Explainer:
         register: bool = True,
         tolerance: Tolerance | str = DEFAULT_TOLERANCE,
         source_unit: str | None = None,
+        repair: bool = False,
     ) -> Explanation:
         """Register the source to the target and explain the result. The same clouds give the same numbers.
 
@@ -102,6 +105,7 @@ class Explainer:
             source_unit: unit of the source's points, if another one; they are converted first.
             fast: whether to re-enact fewer points and poses, without a guarantee; it saves a tenth to a fifth of the
                 time.
+            repair: whether to put a wrong result right, see :meth:`repair`.
 
         Raises:
             InputError: too few points with a measurement, implausible units, very different sizes, an initial pose that
@@ -113,8 +117,7 @@ class Explainer:
         with _timed(seconds, "preparation"):
             inputs = (source_points, target_points, T_target_source_init, unit, frame)
             clouds = Clouds.prepared(*inputs, self.model.cloud_points, self.model.icp, notes, source_unit)
-            allowed = tolerance if isinstance(tolerance, Tolerance) else Tolerance.parse(tolerance)
-            limit = allowed.length(clouds.target, clouds.frame.diameter, unit)
+            limit = _limit(clouds, tolerance, unit)
         with _timed(seconds, "icp"):
             outcome = self._aligned(clouds, method, notes) if register else _as_given(clouds)
         T_found = outcome.T_target_source
@@ -157,12 +160,18 @@ class Explainer:
         if uncertainty is not None:
             with _timed(seconds, "uncertainty"):
                 spread = self._spread(clouds, outcome, method, estimator, uncertainty, notes)
+        repaired = None
+        if repair:
+            with _timed(seconds, "repair"):
+                repaired = Repair.of(self.model, clouds, outcome, method if register else GIVEN, limit, unit=unit)
         if voids:
             decision = Decision(CHECK, "", ", ".join(void.check for void in voids))
         elif diagnosis is None:
             decision = self.policy.decide(scores_C, float(bald), concepts=self.model.gpc.classes)
         elif diagnosis.state == NOMINAL:
             decision = Decision(NOTHING, "", diagnosis.remark)
+        elif repaired is not None and repaired.verdict == REPAIRED:
+            decision = Decision(TAKE, "", repaired.reason)
         else:
             decision = self._decided(diagnosis, register)
         return Explanation(
@@ -180,6 +189,7 @@ class Explainer:
             action=decision.action,
             reason=decision.reason,
             spread=spread,
+            repaired=repaired and replace(repaired, scene=None),
             unit=unit,
             tolerance=limit,
             seconds=seconds | {"total": perf_counter() - started},
@@ -191,8 +201,34 @@ class Explainer:
                 *(clouds.source, clouds.target, T_found, clouds.frame),
                 *(self.model.icp.correspondence_distance, limit / clouds.frame.diameter),
                 *((enactments, self.model.diagnoser.truth) if enactments else ()),
-            ),
+            ).beside(repaired.scene if repaired else None),
         )
+
+    def repair(
+        self,
+        source_points: np.ndarray,
+        target_points: np.ndarray,
+        T_target_source_init: np.ndarray | None = None,
+        unit: str = "m",
+        frame: CanonicalFrame | None = None,
+        method: str | None = None,
+        register: bool = True,
+        tolerance: Tolerance | str = DEFAULT_TOLERANCE,
+        source_unit: str | None = None,
+    ) -> Repair:
+        """Register the source to the target and, if the result is wrong, put it right (docs/repair.md).
+
+        The arguments are those of :meth:`explain`. Without `register`, the given pose is put right. The method also
+        refines what the search finds, unless it is global.
+        """
+        started = perf_counter()
+        notes: list[str] = []
+        inputs = (source_points, target_points, T_target_source_init, unit, frame)
+        clouds = Clouds.prepared(*inputs, self.model.cloud_points, self.model.icp, notes, source_unit)
+        limit = _limit(clouds, tolerance, unit)
+        outcome = self._aligned(clouds, method, notes) if register else _as_given(clouds)
+        repaired = Repair.of(self.model, clouds, outcome, method if register else GIVEN, limit, unit=unit)
+        return replace(repaired, notes=tuple(notes), seconds=perf_counter() - started)
 
     def judge(
         self, source_points: np.ndarray, target_points: np.ndarray, T_target_source: np.ndarray, **options: Any
@@ -315,6 +351,17 @@ def judge(
 ) -> Explanation:
     """Judge a pose by the default model, see :meth:`Explainer.judge`; for many pairs, load an explainer once."""
     return Explainer.load().judge(source_points, target_points, T_target_source, **options)
+
+
+def repair(source_points: np.ndarray, target_points: np.ndarray, *options: Any, **named: Any) -> Repair:
+    """Put a registration right by the default model, see :meth:`Explainer.repair`; for many pairs, load one once."""
+    return Explainer.load().repair(source_points, target_points, *options, **named)
+
+
+def _limit(clouds: Clouds, tolerance: Tolerance | str, unit: str) -> float:
+    """Return how far the pose may be off, in the unit of the points."""
+    allowed = tolerance if isinstance(tolerance, Tolerance) else Tolerance.parse(tolerance)
+    return allowed.length(clouds.target, clouds.frame.diameter, unit)
 
 
 def _as_given(clouds: Clouds) -> Outcome:

@@ -85,6 +85,7 @@ class ExplainedRegistration:
     """What is reported of any registration: its result, what to do next, and how it is shown."""
 
     html: ClassVar[Callable[..., str]]
+    lines: ClassVar[Callable[..., list[str]]]  # what was found, as text
 
     T_target_source: np.ndarray  # (4, 4) the resulting pose, in the unit of the points
     fitness: float
@@ -169,6 +170,7 @@ class Explanation(ExplainedRegistration):
     """
 
     diagnosis: Diagnosis | None  # state and causes, learned from measured causes; None if not requested
+    repaired: ExplainedRegistration | None = None  # a :class:`gpca.model.repaired.Repair`, if requested
     tolerance: float  # how far the pose may be off, in the unit of the points
     scores: dict[str, float]
     variances: dict[str, float]
@@ -189,12 +191,14 @@ class Explanation(ExplainedRegistration):
 
     def as_dict(self) -> dict[str, object]:
         """Values for JSON."""
-        return super().as_dict() | {"diagnosis": self.diagnosis and self.diagnosis.as_dict()}
+        parts = {"diagnosis": self.diagnosis, "repaired": self.repaired}
+        return super().as_dict() | {name: part and part.as_dict() for name, part in parts.items()}
 
     def html(self, names: Mapping[str, str] | None = None) -> str:
         """Return a page that needs no other file: both clouds in 3-D, causes, poses, counterfactuals."""
         scene, explained = self.scene, self.as_dict()
         body = [page.action(explained, self.advice)]
+        body += [page.listed("Repair", self.repaired.lines())] if self.repaired else []
         if scene and self.unknown:
             scene = replace(scene, enactments=())  # hypotheses mean nothing where scores mean nothing
         elif self.diagnosis and not self.unknown:
@@ -211,27 +215,29 @@ class Explanation(ExplainedRegistration):
         head = page.headline(explained) + page.warnings(self.warnings)
         return page.assembled("Registration explained", head, body, scene, self.unit)
 
+    def lines(self) -> list[str]:
+        """Return what was found, as text."""
+        action = [f"action    {self.advice} ({self.reason})", *(self.repaired.lines() if self.repaired else [])]
+        if self.unknown:
+            return [f"state     {UNKNOWN}", *action]
+        return [
+            *(self.diagnosis.lines(self.unit) if self.diagnosis else []),
+            *action,
+            "",
+            PAPER,
+            *(f"warning   {line}" for line in self.gpca_warnings),
+            f"{'':10}{'score':>8}{'variance':>10}",
+            *(f"{name:10}{self.scores[name]:8.3f}{self.variances[name]:10.4f}" for name in self.scores),
+            f"entropy {self.entropy:.3f} nats, BALD {self.bald:.3f} nats",
+        ]
+
     def text(self) -> str:
         """Return a report for a reader."""
-        action = f"action    {self.advice} ({self.reason})"
-        if self.unknown:
-            body = [f"state     {UNKNOWN}", action]
-        else:
-            body = [
-                *(self.diagnosis.lines(self.unit) if self.diagnosis else []),
-                action,
-                "",
-                PAPER,
-                *(f"warning   {line}" for line in self.gpca_warnings),
-                f"{'':10}{'score':>8}{'variance':>10}",
-                *(f"{name:10}{self.scores[name]:8.3f}{self.variances[name]:10.4f}" for name in self.scores),
-                f"entropy {self.entropy:.3f} nats, BALD {self.bald:.3f} nats",
-            ]
         lines = [f"fitness {self.fitness:.3f}, inlier RMSE {in_decimals(self.inlier_rmse, 4)} {self.unit}"]
         if self.spread is not None:
             lines.append(self.spread.line(self.unit))
         stages = ", ".join(f"{stage} {1e3 * seconds:.1f}" for stage, seconds in self.seconds.items())
-        return self._report(body, "\n".join(lines), "", f"milliseconds   {stages}")
+        return self._report(self.lines(), "\n".join(lines), "", f"milliseconds   {stages}")
 
 
 @dataclass(frozen=True)
@@ -268,10 +274,10 @@ class ScanExplanation(ExplainedRegistration):
         """Hypotheses of the true pose, most probable first."""
         return self.reenacted.poses
 
-    def text(self) -> str:
-        """Return a report for a reader."""
-        rmse, voxel, limit = (page.length(value, self.unit) for value in (self.inlier_rmse, self.voxel, self.limit))
-        body = [
+    def lines(self) -> list[str]:
+        """Return what was found, as text."""
+        limit = page.length(self.limit, self.unit)
+        return [
             f"state     {self.state}",
             f"failure   probability {self.failure:.2f} of an error above {limit}",
             f"causes    {self._named()}",
@@ -280,10 +286,14 @@ class ScanExplanation(ExplainedRegistration):
             *self.reenacted.pose_lines("the source", self.unit),
             f"action    {self.advice} ({self.reason})",
         ]
+
+    def text(self) -> str:
+        """Return a report for a reader."""
+        rmse, voxel = (page.length(value, self.unit) for value in (self.inlier_rmse, self.voxel))
         lines = [f"fitness {self.fitness:.3f}, inlier RMSE {rmse}, voxels of {voxel}"]
         if self.spread is not None:
             lines.append(self.spread.line(self.unit))
-        return self._report(body, "\n".join(lines))
+        return self._report(self.lines(), "\n".join(lines))
 
     def html(self, names: Mapping[str, str] | None = None) -> str:
         """Return a page that needs no other file, as :meth:`Explanation.html` does."""

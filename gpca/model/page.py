@@ -32,7 +32,7 @@ def assembled(title: str, head: str, body: Sequence[str], scene: Scene | None, u
     if scene is not None:
         buttons = (
             f'<button type="button" data-view="pose:{k}" aria-pressed="false">Pose {k + 1}</button>'
-            for k in range(len(scene.possibilities))
+            for k in range(len(scene.possibilities) or len(scene.T_others))
         )
         view = Template(text["view.html"]).substitute(poses="".join(buttons))
         data = json.dumps(scene.packed(unit), separators=(",", ":")).replace("<", "\\u003c")
@@ -71,6 +71,12 @@ def headline(explained: Mapping) -> str:
 def warnings(lines: Sequence[str]) -> str:
     items = "".join(f"<li>{escape(line)}</li>" for line in lines)
     return f'<ul class="warnings">{items}</ul>' if items else ""
+
+
+def listed(title: str, lines: Sequence[str]) -> str:
+    """Return a section with lines of text, whose first ten columns are a word."""
+    rows = "".join(f"<dt>{escape(line[:10].strip())}</dt><dd>{escape(line[10:])}</dd>" for line in lines)
+    return section(title, f"<dl>{rows}</dl>")
 
 
 def action(explained: Mapping, advice: str) -> str:

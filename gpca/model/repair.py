@@ -17,14 +17,25 @@ from gpca.alignment.methods.interface import Pair
 from gpca.alignment.methods.registry import make_method
 from gpca.causes.settings import MODEL, Moved
 from gpca.model.result import Calibrated, Evidence, ResultJudge
-from gpca.reenactment.hypotheses import FEWEST_INLIERS, LAST_ITERATIONS, SAME, distinct_rows
+from gpca.pairs.distances import ObservedPair
+from gpca.reenactment.hypotheses import (
+    FEWEST_INLIERS,
+    LAST_ITERATIONS,
+    SAME,
+    distinct_rows,
+    find_hypotheses,
+    weights_of,
+)
 from gpca.reenactment.mixture import Mixture
-from gpca.reenactment.surface import ModelSurface
+from gpca.reenactment.settings import ReenactmentSettings
+from gpca.reenactment.surface import ModelSurface, covered_points
 from gpca.rigid import inverse, inverses, transform
+from gpca.seeds import generator
 
 GOOD, REPAIRED, NOT_REPAIRED, SEVERAL = VERDICTS = ("good", "repaired", "not repaired", "several poses fit")
 WRONG = 0.05  # largest share of wrong poses among those that are called repaired
 LEAST_WEIGHT = 0.05  # of a pose that is offered beside others
+OF_WIDTH = 0.7  # of the mixture's width: the noise, without the gaps between the target's points
 LARGE = 0.5  # of the largest distance: from this on, a point belongs to the part in which two poses differ
 
 Refine = Callable[[np.ndarray, np.ndarray], np.ndarray]  # points (n, 3), a pose (4, 4) -> where a method ends
@@ -86,10 +97,9 @@ def propose(
     return Proposals(T_n, np.append(0.0, weight_n), evidence)
 
 
-def by_icp(model: np.ndarray, icp: ICPSettings) -> Refine:
-    """Return what refines a pose to a model (M, 3) by the compiled ICP."""
-    registrar = BatchedICP(model, icp)
-    return lambda points, T: registrar.register(points, T[None])[0][0]
+def by_icp(icp: BatchedICP) -> Refine:
+    """Return what refines a pose by ICP to a model."""
+    return lambda points, T: icp.register(points, T[None])[0][0]
 
 
 def by_method(model: np.ndarray, name: str, seed: int) -> Refine:
@@ -103,6 +113,13 @@ def measured(observed: np.ndarray, model: np.ndarray, icp: ICPSettings, moved: M
     if moved == MODEL:
         return lambda T_n: BatchedICP(observed, icp).register(model, inverses(T_n), max_iterations=0)[1:]
     return lambda T_n: BatchedICP(model, icp).register(observed, T_n, max_iterations=0)[1:]
+
+
+def search(pair: ObservedPair, settings: ReenactmentSettings, surface: ModelSurface) -> tuple[np.ndarray, np.ndarray]:
+    """Return the hypotheses (K, 4, 4) of a pair's true pose, as a re-enactment has them, and their weights."""
+    before, T_runs_n = transform(pair.T_init, pair.observed), pair.T_runs @ inverse(pair.T_init)
+    found = find_hypotheses(before, surface, T_runs_n, settings, generator(*pair.axes, "hypotheses"))
+    return np.array([hypothesis.T for hypothesis in found]), weights_of(found)
 
 
 def decide(judge: ResultJudge, level: Calibrated, proposals: Proposals, tolerance: float) -> Verdict:
@@ -135,18 +152,30 @@ def inliers(points: np.ndarray, surface: ModelSurface, T_K: np.ndarray) -> np.nd
 class Part:
     """A part of the target's surface."""
 
-    direction: np.ndarray  # (3,) unit vector from the middle of the surface to that of the part
+    direction: tuple[float, ...]  # (3,) unit vector from the middle of the surface to that of the part
     share: float  # of the surface
-    distance: float  # mean over the part, diameters
+
+    @classmethod
+    def of(cls, surface: ModelSurface, inside_M: np.ndarray) -> Part:
+        """Describe which points (M,) of the surface belong to it."""
+        away = surface.points[inside_M].mean(axis=0) - surface.points.mean(axis=0)
+        return cls(tuple((away / max(np.linalg.norm(away), 1e-9)).tolist()), float(inside_M.mean()))
 
 
-def part_of(surface: ModelSurface, distance_M: np.ndarray, inside_M: np.ndarray) -> Part:
-    """Describe which points (M,) of the surface belong to a part."""
-    away = surface.points[inside_M].mean(axis=0) - surface.points.mean(axis=0)
-    return Part(away / max(np.linalg.norm(away), 1e-9), float(inside_M.mean()), float(distance_M[inside_M].mean()))
-
-
-def difference(surface: ModelSurface, T_one: np.ndarray, T_other: np.ndarray) -> Part:
-    """Return what tells two poses apart: where one has surface, and the other has none nearby."""
+def difference(surface: ModelSurface, T_one: np.ndarray, T_other: np.ndarray) -> tuple[Part, float]:
+    """Return what tells two poses apart: where one has surface, and how far from it the other has its own."""
     distance_M = surface.distances(transform(T_other @ inverse(T_one), surface.points))
-    return part_of(surface, distance_M, distance_M >= LARGE * distance_M.max())
+    inside_M = distance_M >= LARGE * distance_M.max()
+    return Part.of(surface, inside_M), float(distance_M[inside_M].mean())
+
+
+def unseen(points: np.ndarray, surface: ModelSurface, T: np.ndarray) -> tuple[float, Part | None]:
+    """Return the share of outliers among observed points (N, 3) at a pose, and the part of the surface they leave out.
+
+    It is None where they leave out next to nothing.
+    """
+    fits = Mixture(surface.points, surface.spacing / 2).fit(points, T[None], LAST_ITERATIONS, moving=False)
+    inlier_N, blur = fits.inlier_n_N[0] > 0.5, OF_WIDTH * float(fits.width_n[0])
+    seen = transform(T, points[inlier_N] if inlier_N.sum() >= FEWEST_INLIERS else points)
+    missing_M = ~covered_points(surface.points, seen, blur, generator("repair", "blur"))
+    return float(1 - inlier_N.mean()), Part.of(surface, missing_M) if missing_M.any() else None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -48,6 +48,12 @@ class Scene:
     limit: float  # error above which a registration counts as failed, diameters
     enactments: Sequence[Enactment] = ()  # most probable first
     truth: CauseSettings = field(default_factory=CauseSettings)  # their settings
+    T_repaired: np.ndarray | None = None  # (4, 4) of the pose that takes the place of the result
+    T_others: Sequence[np.ndarray] = ()  # poses to be shown where nothing was re-enacted
+
+    def beside(self, other: Scene | None) -> Scene:
+        """Return the scene with the repaired pose of another, if there is one."""
+        return self if other is None else replace(self, T_repaired=other.T_repaired)
 
     @property
     def aligned(self) -> np.ndarray:
@@ -81,8 +87,9 @@ class Scene:
         poses = [
             {"T": flat(pose.T), "what_ifs": [packed(pose.clouds[subset]) for subset in BY_SIZE]}
             for pose in self.possibilities
-        ]
-        return pair | {"poses": poses}
+        ] or [{"T": flat(T), "what_ifs": []} for T in self.T_others]
+        repaired = {} if self.T_repaired is None else {"repaired": flat(self.T_repaired)}
+        return pair | {"poses": poses} | repaired
 
 
 def packed_pair(

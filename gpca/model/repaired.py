@@ -1,0 +1,245 @@
+"""A registration that was put right, or why it was not, as a user is told."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from gpca.alignment.methods.interface import Outcome
+from gpca.alignment.methods.registry import method_entry
+from gpca.causes.policy import NOTHING
+from gpca.causes.settings import OBSERVED
+from gpca.model import page
+from gpca.model.clouds import Clouds, voids_of
+from gpca.model.diagnosis import CHECK, TAKE, UNKNOWN, FittingPose
+from gpca.model.explanation import GIVEN, ExplainedRegistration
+from gpca.model.file import Model
+from gpca.model.repair import (
+    GOOD,
+    NOT_REPAIRED,
+    REPAIRED,
+    SEVERAL,
+    WRONG,
+    Part,
+    Proposals,
+    Verdict,
+    by_icp,
+    by_method,
+    decide,
+    difference,
+    measured,
+    propose,
+    search,
+    unseen,
+)
+from gpca.model.result import calibrated_at
+from gpca.model.scene import Scene
+from gpca.numerals import in_decimals
+from gpca.objects.canonical import CanonicalFrame
+from gpca.reenactment.surface import ModelSurface
+from gpca.rigid import transform
+from gpca.seeds import seed_of
+
+STATUSES = {GOOD: 0, REPAIRED: 0, UNKNOWN: 3, NOT_REPAIRED: 4, SEVERAL: 5}  # exit codes of the command
+ACTIONS = {GOOD: NOTHING, REPAIRED: TAKE}  # for the others, `CHECK`
+TONES = {GOOD: "good", REPAIRED: "good", NOT_REPAIRED: "bad"}  # CSS classes; for the others, "doubt"
+ALONG = 0.95  # cosine of the angle to an axis within which that axis names a direction
+
+
+def side_in_words(direction: Sequence[float]) -> str:
+    """Describe a unit vector (3,) in the target's frame."""
+    along = int(np.argmax(np.abs(direction)))
+    if abs(direction[along]) >= ALONG:
+        return f"the target's {'+' if direction[along] > 0 else '-'}{'xyz'[along]} side"
+    return f"the side toward ({', '.join(f'{part:.2f}' for part in direction)}) in the target's frame"
+
+
+@dataclass(frozen=True)
+class OtherPose(FittingPose):
+    """A refined hypothesis of the true pose; its `error` is the expected one, as a judge has it."""
+
+    off: float  # probability that it is off by more than the tolerance
+    differs: Part | None  # the part of the target that tells it from the first of these poses; None of the first
+    differs_by: float  # mean distance over that part
+
+    def outside(self, frame: CanonicalFrame, T_target_source_init: np.ndarray) -> Self:
+        """Convert to the user's frame and unit of length, in which the initial pose is given."""
+        converted = super().outside(frame, T_target_source_init)
+        return replace(converted, differs_by=frame.diameter * self.differs_by)
+
+    def line(self, number: int, unit: str) -> str:
+        """One line of text."""
+        words = self.words(unit, "fits")
+        text = f"pose {number}    {words}: probability {self.probability:.2f}; alone, off with {self.off:.2f}"
+        if self.differs is None:
+            return text
+        part = f"{self.differs.share:.0%} of the target, on {side_in_words(self.differs.direction)}"
+        return f"{text}; {part}, tells it from pose 1, by {in_decimals(self.differs_by)} {unit}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Repair(ExplainedRegistration):
+    """What became of one registration; `T_target_source` is the registered pose, unless it was repaired."""
+
+    verdict: str  # ``good``, ``repaired``, ``not repaired``, ``several poses fit`` or ``unknown``
+    T_registered: np.ndarray  # (4, 4)
+    tolerance: float  # in the unit of the points
+    tolerance_share: float  # in diameters of the target
+    registered_result: float | None = None  # probability that the registered pose is off by more than the tolerance,
+    result: float | None = None  # and that `T_target_source` is; None if unknown
+    failed_from: float | None = None  # probability from which a registered pose is called failed,
+    good_below: float | None = None  # and below which another takes its place
+    wrong: float | None = None  # at most this share of poses that are called repaired is wrong; None: no promise
+    outliers: float | None = None  # share of the source that was left out at the likeliest pose
+    missing: Part | None = None  # the part of the target that was not seen there; None if nearly all was
+    poses: tuple[OtherPose, ...] = ()  # that the search found, refined; if several fit, these alone
+    seconds: float = 0.0  # duration
+
+    @classmethod
+    def of(cls, model: Model, clouds: Clouds, outcome: Outcome, method: str | None, limit: float, unit: str) -> Repair:
+        """Put a registration right, if it is wrong.
+
+        Args:
+            outcome: in the target's frame, as the clouds are.
+            method: of the registration, None for the model's ICP, or `GIVEN`. It refines other poses, unless it is
+                global: then the model's ICP does.
+            limit: how far the pose may be off, in the unit of the points.
+        """
+        frame, T_init, T = clouds.frame, clouds.T_target_source_init, outcome.T_target_source
+        diagnoser, tolerance, T_registered = model.diagnoser, limit / frame.diameter, frame.pose_outside(T) @ T_init
+        voids = voids_of(clouds.source, clouds.target, outcome.fitness, model.familiar)
+        scene = Scene(clouds.source, clouds.target, T, frame, model.icp.correspondence_distance, tolerance)
+        unrepaired = cls(
+            T_target_source=T_registered,
+            T_registered=T_registered,
+            fitness=outcome.fitness,
+            inlier_rmse=outcome.inlier_rmse * frame.diameter,
+            method=method or model.icp.method,
+            verdict=UNKNOWN,
+            action=CHECK,
+            reason="check " + ", ".join(void.check for void in voids),
+            unit=unit,
+            tolerance=limit,
+            tolerance_share=tolerance,
+            warnings=(*map(str, voids), *model.familiar.warnings(clouds.source, clouds.target)[0]),
+            learned_from=model.learning,
+            scene=scene,
+        )
+        if voids:
+            return unrepaired
+        refine = by_icp(clouds.icp)
+        if method not in (None, GIVEN) and not method_entry(method).is_global:
+            refine = by_method(clouds.target, method, seed_of("repair", method))
+        pair = diagnoser.pair(clouds.source, clouds.target, T, method != GIVEN)
+        surface, before = ModelSurface(pair.model), transform(pair.T_init, pair.observed)
+        measure = measured(before, pair.model, diagnoser.runs.icp, OBSERVED)
+        hypotheses = search(pair, diagnoser.reenactment, surface)
+        found = propose(clouds.source, surface, T, *hypotheses, refine, measure)
+        found.evidence.fitness_N[0], found.evidence.inlier_rmse_N[0] = pair.fitness_n[0], pair.inlier_rmse_n[0]
+        level = calibrated_at(diagnoser.levels, tolerance)
+        verdict = decide(diagnoser.judge, level, found, tolerance)
+        errors_n = diagnoser.judge.error(found.evidence)
+        poses = [pose.outside(frame, T_init) for pose in other_poses(found, verdict, errors_n, surface)]
+        best = verdict.row or 1
+        outliers, missing = unseen(clouds.source, surface, found.T_n[best])
+        probability_n = verdict.probability_n.tolist()
+        T_new = poses[best - 1].T_target_source if verdict.row else T_registered
+        if verdict.rows:
+            poses = [poses[row - 1] for row in verdict.rows]
+        T_repaired = found.T_n[verdict.row] if verdict.row else None
+        return replace(
+            unrepaired,
+            T_target_source=T_new,
+            verdict=verdict.name,
+            action=ACTIONS.get(verdict.name, CHECK),
+            reason=reason_of(verdict, poses, unit),
+            registered_result=probability_n[0],
+            result=probability_n[verdict.row],
+            failed_from=level.threshold,
+            good_below=level.good_below,
+            wrong=None if level.repaired_below is None else WRONG,
+            outliers=outliers,
+            missing=missing,
+            poses=tuple(poses),
+            scene=replace(scene, T_repaired=T_repaired, T_others=tuple(found.T_n[list(verdict.rows)])),
+        )
+
+    @property
+    def settled(self) -> bool:
+        """Whether `T_target_source` is a pose to use."""
+        return self.verdict in (GOOD, REPAIRED)
+
+    @property
+    def status(self) -> int:
+        """The exit code of the command."""
+        return STATUSES[self.verdict]
+
+    def lines(self) -> list[str]:
+        """Lines of text."""
+        lines = [f"repair    {self.verdict}: {self.reason}"]
+        if self.result is None:
+            return lines
+        before = f"; before, {self.registered_result:.2f}" if self.verdict == REPAIRED else ""
+        limit = f"{in_decimals(self.tolerance)} {self.unit} ({100 * self.tolerance_share:.2g} % of the diameter)"
+        lines.append(f"result    probability {self.result:.2f} that the pose is off by more than {limit}{before}")
+        if self.verdict == REPAIRED:
+            lines.append(f"promise   {self._promise}")
+        if self.verdict != GOOD:
+            lines.append(f"seen      {self._seen}")
+        if not self.settled:
+            lines += [pose.line(number, self.unit) for number, pose in enumerate(self.poses, 1)]
+        return lines
+
+    def text(self) -> str:
+        """Return a report for a reader, of few lines."""
+        warnings = [f"warning   {line}" for line in self.warnings]
+        head = f"T_target_source, in {self.unit}" + ("" if self.settled else ", as registered")
+        return "\n".join([*warnings, *self.lines(), "", head, *self.pose_rows(self.T_target_source), ""])
+
+    def html(self, names: Mapping[str, str] | None = None) -> str:
+        """Return a page that needs no other file, with the registered pose and the repaired one side by side."""
+        head = f'<h1 class="{TONES.get(self.verdict, "doubt")}">{page.sentence(self.verdict)}</h1>'
+        inputs = {"training": self.learned_from} | dict(names or {})
+        head += f"<p>{page.sentence(self.reason)}.</p>{page.warnings(self.warnings)}"
+        details = page.details(self.as_dict(), inputs, self.pose_rows(self.T_target_source))
+        body = [page.listed("Repair", self.lines()), details]
+        return page.assembled("Registration repaired", head, body, self.scene, self.unit)
+
+    @property
+    def _promise(self) -> str:
+        if self.wrong is None:
+            return "none: this model was not calibrated on repaired poses"
+        return f"at most {self.wrong:.0%} of the poses that are called repaired are wrong"
+
+    @property
+    def _seen(self) -> str:
+        outliers = f"{self.outliers or 0:.0%} of the source are outliers"
+        if self.missing is None:
+            return outliers
+        side = side_in_words(self.missing.direction)
+        return f"{outliers}; {self.missing.share:.0%} of the target were not seen, on {side}"
+
+
+def other_poses(found: Proposals, verdict: Verdict, error_n: np.ndarray, surface: ModelSurface) -> list[OtherPose]:
+    """Describe the proposals for the place of the registered pose, in diameters."""
+    poses, first = [], verdict.rows[0] if verdict.rows else 1
+    for row in range(1, len(found.T_n)):
+        T, off = found.T_n[row], float(verdict.probability_n[row])
+        differs, by = (None, 0.0) if row == first else difference(surface, found.T_n[first], T)
+        numbers = float(found.weight_n[row]), float(error_n[row])
+        poses.append(OtherPose.of(T, *numbers, found.T_n[0], surface, off=off, differs=differs, differs_by=by))
+    return poses
+
+
+def reason_of(verdict: Verdict, poses: Sequence[OtherPose], unit: str) -> str:
+    """Say why this is the verdict."""
+    if verdict.name == GOOD:
+        return "the registered pose is not called failed, so it stays"
+    if verdict.name == SEVERAL:
+        return f"one of {len(poses)} poses is right, and the points do not tell which"
+    if verdict.name == NOT_REPAIRED:
+        return "the registered pose is called failed, and no other is called good"
+    return f"the source {poses[verdict.row - 1].words(unit, 'fits')}"
