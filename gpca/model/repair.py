@@ -38,7 +38,7 @@ LEAST_WEIGHT = 0.05  # of a pose that is offered beside others
 OF_WIDTH = 0.7  # of the mixture's width: the noise, without the gaps between the target's points
 LARGE = 0.5  # of the largest distance: from this on, a point belongs to the part in which two poses differ
 
-Refine = Callable[[np.ndarray, np.ndarray], np.ndarray]  # points (n, 3), a pose (4, 4) -> where a method ends
+Refine = Callable[[np.ndarray, np.ndarray], np.ndarray]  # observed points (N, 3), poses (k, 4, 4) -> where they end
 Measure = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]  # poses (n, 4, 4) -> fitness (n,), inlier RMSE (n,)
 
 
@@ -76,17 +76,16 @@ def propose(
     refine: Refine,
     measure: Measure,
 ) -> Proposals:
-    """Refine hypotheses (K, 4, 4) by a registration method, on the observed points (N, 3) that are no outliers there.
+    """Refine hypotheses (K, 4, 4) of the true pose of observed points (N, 3).
 
     Args:
         weight_K: their probabilities, 0 for entries that only fill up.
-        refine: the registration method from a pose.
+        refine: what refines them.
         measure: fitness and inlier RMSE of poses, as the judge knows them.
     """
     possible = np.flatnonzero(weight_K > 0)
     possible = possible[np.argsort(-weight_K[possible], kind="stable")]
-    inlier_k_N = inliers(observed, surface, T_K[possible])
-    T_k = np.array([refine(observed[inlier_N], T) for inlier_N, T in zip(inlier_k_N, T_K[possible], strict=True)])
+    T_k = refine(observed, T_K[possible])
     rows = distinct_rows(surface, T_k, len(T_k), SAME / 2)
     apart_k_n = np.stack([surface.apart(T_k @ inverse(T_k[row])) for row in rows], axis=1)
     weight_n = np.bincount(apart_k_n.argmin(axis=1), weight_K[possible], minlength=len(rows))
@@ -97,15 +96,33 @@ def propose(
     return Proposals(T_n, np.append(0.0, weight_n), evidence)
 
 
-def by_icp(icp: BatchedICP) -> Refine:
-    """Return what refines a pose by ICP to a model."""
-    return lambda points, T: icp.register(points, T[None])[0][0]
+def by_mixture(model: np.ndarray, spacing: float) -> Refine:
+    """Return what refines poses to a model (M, 3) by the likelihood of the hypotheses, in which outliers hardly count.
+
+    The spacing is the distance between the model's points.
+    """
+    mixture = Mixture(model, spacing / 2)
+
+    def refine(observed: np.ndarray, T_k: np.ndarray) -> np.ndarray:
+        width_k = mixture.fit(observed, T_k, LAST_ITERATIONS, moving=False).width_n
+        return mixture.fit(observed, T_k, LAST_ITERATIONS, width_n=width_k).T_n
+
+    return refine
 
 
-def by_method(model: np.ndarray, name: str, seed: int) -> Refine:
-    """Return what refines a pose by a registration method of the registry; where this fails, the pose stays."""
+def by_method(model: np.ndarray, surface: ModelSurface, name: str, seed: int) -> Refine:
+    """Return what refines poses to a model (M, 3) by a registration method, on the points that are no outliers there.
+
+    Where the method fails, the pose stays. `surface` is that of some of the model's points.
+    """
     method = make_method(name)
-    return lambda points, T: method(Pair(points, model, T, seed=seed).with_normals()).T_target_source
+
+    def refine(observed: np.ndarray, T_k: np.ndarray) -> np.ndarray:
+        pairs = zip(inliers(observed, surface, T_k), T_k, strict=True)
+        pairs_k = (Pair(observed[inlier_N], model, T, seed=seed).with_normals() for inlier_N, T in pairs)
+        return np.array([method(pair).T_target_source for pair in pairs_k])
+
+    return refine
 
 
 def measured(observed: np.ndarray, model: np.ndarray, icp: ICPSettings, moved: Moved) -> Measure:

@@ -26,8 +26,8 @@ from gpca.model.repair import (
     Part,
     Proposals,
     Verdict,
-    by_icp,
     by_method,
+    by_mixture,
     decide,
     difference,
     measured,
@@ -104,8 +104,8 @@ class Repair(ExplainedRegistration):
 
         Args:
             outcome: in the target's frame, as the clouds are.
-            method: of the registration, None for the model's ICP, or `GIVEN`. It refines other poses, unless it is
-                global: then the model's ICP does.
+            method: of the registration, None for the model's ICP, or `GIVEN`. A local one that was named refines the
+                hypotheses; else, the likelihood does by which they were found.
             limit: how far the pose may be off, in the unit of the points.
         """
         frame, T_init, T = clouds.frame, clouds.T_target_source_init, outcome.T_target_source
@@ -130,11 +130,11 @@ class Repair(ExplainedRegistration):
         )
         if voids:
             return unrepaired
-        refine = by_icp(clouds.icp)
-        if method not in (None, GIVEN) and not method_entry(method).is_global:
-            refine = by_method(clouds.target, method, seed_of("repair", method))
         pair = diagnoser.pair(clouds.source, clouds.target, T, method != GIVEN)
         surface, before = ModelSurface(pair.model), transform(pair.T_init, pair.observed)
+        refine = by_mixture(clouds.target, surface.spacing * np.sqrt(len(pair.model) / len(clouds.target)))
+        if method not in (None, GIVEN) and not method_entry(method).is_global:
+            refine = by_method(clouds.target, surface, method, seed_of("repair", method))
         measure = measured(before, pair.model, diagnoser.runs.icp, OBSERVED)
         hypotheses = search(pair, diagnoser.reenactment, surface)
         found = propose(clouds.source, surface, T, *hypotheses, refine, measure)

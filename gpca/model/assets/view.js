@@ -1,6 +1,7 @@
 "use strict";
 
-// Two clouds on a plain canvas: the target, and the source in the pose that was chosen.
+// Two clouds on a plain canvas: the target, and the source in the pose that was chosen; where it was repaired, the same
+// beside it in the repaired pose.
 function openView() {
   const canvas = document.getElementById("view");
   const context = canvas.getContext("2d");
@@ -66,7 +67,7 @@ function openView() {
     if (!clouds.has(view)) {
       const [kind, k, row] = view.split(":");
       const points = kind === "what" ? unpack(whatIf(scene.poses[k].what_ifs, row))
-        : moved(source, { start: IDENTITY, found: scene.found }[kind] || scene.poses[k].T);
+        : moved(source, { start: IDENTITY, found: scene.found, repaired: scene.repaired }[kind] || scene.poses[k].T);
       clouds.set(view, { points, distances: nearest(points, target) });
     }
     return clouds.get(view);
@@ -83,17 +84,20 @@ function openView() {
       const button = document.querySelector(`.what-if[data-view="${view}"] span`);
       return `Re-enacted as if pose ${Number(k) + 1} were true, ${button.textContent.toLowerCase()}`;
     }
-    return { start: "Before the registration", found: "After the registration" }[kind] || `Pose ${Number(k) + 1}`;
+    return { start: "Before the registration", found: "After the registration", repaired: "Repaired" }[kind]
+      || `Pose ${Number(k) + 1}`;
   }
 
-  function say() {
-    const { distances } = cloudOf(shown);
+  function said(view) {
+    const { distances } = cloudOf(view);
     const sorted = [...distances].sort((a, b) => a - b);
     const within = distances.reduce((count, distance) => count + (distance <= scene.reach), 0) / distances.length;
-    byId("said").textContent = `${title(shown)}: the median distance to the target is `
+    return `${title(view)}: the median distance to the target is `
       + `${length(sorted[sorted.length >> 1])}, and ${Math.round(100 * within)} % of the points lie within `
       + `${length(scene.reach)} of it.`;
   }
+
+  const views = () => (scene.repaired ? [shown, "repaired"] : [shown]);
 
   function draw() {
     const ratio = window.devicePixelRatio || 1;
@@ -101,11 +105,30 @@ function openView() {
     if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
     context.fillStyle = "#fff";
     context.fillRect(0, 0, width, height);
+    const wide = width / views().length;
+    views().forEach((view, number) => {
+      context.save();
+      context.translate(number * wide, 0);
+      context.beginPath();
+      context.rect(0, 0, wide, height);
+      context.clip();
+      drawView(view, wide, height, ratio);
+      if (scene.repaired) {
+        context.fillStyle = "#1a1a1a";
+        context.font = `${13 * ratio}px system-ui, sans-serif`;
+        context.fillText(title(view), 10 * ratio, 20 * ratio, wide - 20 * ratio);
+      }
+      context.restore();
+    });
+    canvas.dataset.shown = shown;
+  }
+
+  function drawView(view, width, height, ratio) {
     const byDistance = byId("by-distance").checked;
     const parts = [];
     if (byId("show-target").checked) parts.push({ points: target, color: () => (byDistance ? BEHIND : TARGET) });
     if (byId("show-source").checked) {
-      const { points, distances } = cloudOf(shown);
+      const { points, distances } = cloudOf(view);
       parts.push({ points, color: (i) => (byDistance ? colorAt(distances[i] / scene.reach) : SOURCE) });
     }
     const scale = (0.47 * camera.zoom * Math.min(width, height)) / scene.radius;
@@ -128,7 +151,6 @@ function openView() {
       context.fillStyle = `rgb(${r},${g},${b})`;
       context.fillRect(across - size / 2, down - size / 2, size, size);
     }
-    canvas.dataset.shown = shown;
   }
 
   let waiting = false;
@@ -149,7 +171,7 @@ function openView() {
       group.hidden = Number(group.dataset.hypothesis) !== hypothesis;
     }
     if (byId("hypothesis")) byId("hypothesis").textContent = String(hypothesis + 1);
-    say();
+    byId("said").textContent = views().map(said).join(" ");
     redraw();
   }
 
