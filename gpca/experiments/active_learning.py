@@ -78,6 +78,7 @@ EXPERIMENT = Experiment(
     names=lambda config, sources: {
         "strategy": list(config[NAME]["strategies"]),
         "pool_strategy": [name for name in config[NAME]["strategies"] if name not in STREAMS],
+        "further_concept": [name for name in config[NAME]["held_out"] if name != PAPERS_HELD_OUT],
     },
     check=check,
     switches={"active_learning.strategies": Names("strategy", titles)},
@@ -212,6 +213,7 @@ def _table(
 
     Bands are 95 % intervals over the seeds. Only the two thick curves have them, the paper's strategies, which stand
     in every panel; the other strategies are shared out among the panels of a setting.""",
+    needs=("further_concept",),
     **CURVES,
 )
 def active_learning_curves(run: Run, curve_files: Paths) -> Figure:

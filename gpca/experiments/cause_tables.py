@@ -15,11 +15,12 @@ from gpca.declarations.result import Frame, figure, table
 from gpca.evaluation.intervals import REPEATS
 from gpca.evaluation.measures import POOLED
 from gpca.experiments.cause_figures import draw_causes_example
-from gpca.experiments.confusions import draw_confusions_figure
+from gpca.experiments.confusions import draw_confusions
 from gpca.experiments.diagnosis import CAUSES_FILES, DIAGNOSES, cause_costs, cause_titles
 from gpca.explainers.interface import WORDS
 from gpca.objects.entry import dataset_of
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.reporting.figures.panels import in_lines
 from gpca.reporting.figures.reliability import reliability_figure
 from gpca.reporting.sheet import Row, Sheet, crossed, show, where, with_label
 from gpca.reporting.tables.cells import interval_cell, plain_cell, rows_where
@@ -196,19 +197,23 @@ def table9_features(run: Run, intervals):
 
 @figure(
     SECTION,
-    "What each explainer takes a cause for",
-    """What each explainer (rows) takes a nominal registration and each dominant cause for, by dataset (columns),
-    pooled over test samples and seeds, without borderline registrations.""",
+    "What a cause is taken for",
+    """What GP-CA, its classifier on both clouds, and the re-enactment without and with learning take a nominal
+    registration and each dominant cause for, pooled over sources, test samples and seeds, without borderline
+    registrations.""",
     metrics="causes.csv",
 )
 def cause_confusions(run: Run, metrics):
-    return draw_confusions_figure(metrics, run.source_titles, cause_titles(run.config))
+    return draw_confusions(metrics, cause_titles(run.config), COMPARED, ", ".join(run.source_titles.values()))
+
+
+COMPARED = ("gpca", "gpca_pair", "reenact", "reenact_committee")  # the first of the figures
 
 
 @figure(
     SECTION,
     "When it says that nothing is wrong",
-    """Share of the test registrations that are nominal, over each explainer's score of "nominal", for all datasets and
+    """Share of the test registrations that are nominal, over the explainer's score of "nominal", for all datasets and
     seeds together and without borderline registrations. On the diagonal, a score of 0.8 means that nothing is wrong
     in 80 % of the cases. The number is the calibration error of them all (pooled ECE), and vertical lines are Wilson's
     intervals (95 %) of independent samples.""",
@@ -216,12 +221,14 @@ def cause_confusions(run: Run, metrics):
 )
 def nominal_reliability(run: Run, judged):
     titles, samples, sources = run.source_titles, {}, set()
-    for explainer, title in cause_titles(run.config).items():
+    explainers = cause_titles(run.config)
+    shown = [name for name in COMPARED if name in explainers] or list(explainers)[: len(COMPARED)]
+    for explainer in shown:
         parts = {key: each for key, each in judged.items() if key[1] == explainer and key[0] in titles}
         if parts:
             together = joined(parts.values())
             labeled_S = together.label != BORDERLINE
-            samples[title] = together.nominal[labeled_S], together.label[labeled_S] == NOMINAL
+            samples[in_lines(explainers[explainer])] = together.nominal[labeled_S], together.label[labeled_S] == NOMINAL
             sources |= {source for source, _, _ in parts}
     title = ", ".join(title for name, title in titles.items() if name in sources)
     return reliability_figure(samples, title, BINS, 'score of "nominal"', "share", "share that is nominal")

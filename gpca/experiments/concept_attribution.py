@@ -17,7 +17,7 @@ from gpca.declarations.result import Frame, Paths, figure, table
 from gpca.errors import InputError
 from gpca.evaluation.intervals import Clustered, Estimate
 from gpca.evaluation.measures import ALL, intervals, read_all_metrics, source_method_seed
-from gpca.experiments.confusions import draw_confusions_figure
+from gpca.experiments.confusions import draw_confusions
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.registry import explainer_entry
 from gpca.reporting.sheet import Row, Sheet, Show, crossed, show, where, with_label
@@ -231,14 +231,14 @@ def repeats(cells: Iterable[Cell]) -> str:
 
 @figure(
     SECTION,
-    "Confusions of every explainer",
-    """What each explainer (rows) takes each concept for, by source (columns), pooled over test samples and seeds. Each
-    row of a matrix is a true concept, in %; what is missing to 100 is abstained. A perfect explainer has 100 on the
-    diagonal.
-
-    The bars show how often each concept is named, and a dash its true share. If a bar ends far from its dash, the
-    explainer favors or avoids a concept whatever the sample.""",
+    "What a missed concept is taken for",
+    """What GP-CA, the two explainers of the paper beside it, and the classifier on both clouds take each concept for,
+    pooled over sources, test samples and seeds. Each row of a matrix is a true concept; what is missing to 100 % is
+    abstained.""",
     metrics="metrics.csv",
 )
 def fig_attribution_confusions(run: Run, metrics):
-    return draw_confusions_figure(metrics, run.source_titles, titles(run))
+    return draw_confusions(metrics, titles(run), COMPARED, ", ".join(run.source_titles.values()))
+
+
+COMPARED = ("gpca", "shap_removal", "sa_local_removal", "gpca_pair")  # the first of the figure

@@ -1,4 +1,4 @@
-"""Pictures of depth frames: a frame explained (Fig. 5), confusions, the most confident mistakes, and reliability."""
+"""Pictures of depth frames: a frame explained (Fig. 5), confusions, and the most confident mistakes."""
 
 from __future__ import annotations
 
@@ -8,15 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from gpca.attribution.diagnostics import BINS
-from gpca.attribution.predictions import concepts_of, read_predictions
+from gpca.attribution.predictions import read_predictions
 from gpca.declarations.plan import Run
 from gpca.declarations.result import Figure, Frame, Paths, figure
 from gpca.errors import InputError
 from gpca.evaluation.measures import source_method_seed
-from gpca.experiments.confusions import counts_and_shares, pooled_confusions
+from gpca.experiments.confusions import draw_confusions
 from gpca.experiments.frame_views import draw_scores
-from gpca.experiments.frames import encoder_title, read_together, title_of_frames, unreduced_methods
+from gpca.experiments.frames import encoder_title, read_together, title_of_frames
 from gpca.experiments.registration_stages import source_before_icp
 from gpca.frames.instances import Instances
 from gpca.frames.synthesis import HALF_SPACE, OCCLUDER
@@ -26,8 +25,7 @@ from gpca.io.files import read_image
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import FRAME_COLUMNS, Registrations
 from gpca.reporting.figures.cloud_views import draw_clouds, legend_of_clouds
-from gpca.reporting.figures.panels import draw_percentages, panels, write_below
-from gpca.reporting.figures.reliability import reliability_figure
+from gpca.reporting.figures.panels import panels, write_below
 from gpca.reporting.figures.style import (
     BLACK,
     SMALL_PT,
@@ -229,25 +227,8 @@ def draw_real_world_confusions(run: Run, metrics: Frame) -> Figure:
     frames = run.config["real_world"]
     first = next(iter(frames["reductions"]))
     methods = [f"{backbone}-{first}" for backbone in frames["backbones"]]
-    pooled = {method: counts for (_, method), counts in pooled_confusions(metrics).items()}
-    shown = {method: pooled[method] for method in methods if method in pooled}
-    if not shown:
-        raise InputError("real_world.csv", "has no confusion of these backbones", "regenerate it")
-    width_in = min(TEXT_WIDTH_IN, max(3.2, 0.6 + 1.62 * len(shown)))
-    drawing, [axes] = panels(1, len(shown), (width_in - 0.6) / len(shown) + 0.6, width_in, sharey=True)
-    for panel, (method, confusion) in zip(axes, shown.items(), strict=True):
-        concepts = list(confusion.columns[:-1])
-        counts_C_C, shares_C_C = counts_and_shares(confusion)
-        draw_percentages(panel, 100 * shares_C_C, "{:.1f} %\nn = {:.0f}", counts_C_C, linespacing=1.2)
-        panel.set_title(encoder_title(*method.split("-")), pad=3)
-        panel.set_xticks(range(len(concepts)), concepts)
-        panel.set_yticks(range(len(concepts)), concepts, rotation=90, va="center")
-        panel.tick_params(length=0, pad=2)
-        panel.spines[:].set(visible=True, linewidth=0.4)
-    axes[0].set_ylabel("true", labelpad=1)
-    drawing.supxlabel("attributed to", fontsize=8)
-    write_title(drawing, title_of_frames(run.config))
-    return drawing
+    titles = {method: encoder_title(*method.split("-")) for method in methods}
+    return draw_confusions(metrics, titles, (), title_of_frames(run.config), "{:.1f} %\nn = {:.0f}")
 
 
 @figure(
@@ -311,34 +292,3 @@ def mistakes_of(poses_csv: Paths, predictions_csv: Paths) -> Frame:
         parts.append(samples.assign(file=file, score=scores, seed=source_method_seed(predictions)[2])[wrong])
     mistakes = pd.concat(parts).sort_values(["score", "seed", "row"], ascending=[False, True, True])
     return mistakes.drop_duplicates(["instance", "concept_true"]).reset_index(drop=True)
-
-
-@figure(
-    SECTION,
-    "Reliability on depth frames",
-    """Accuracy over confidence of GP-CA on depth frames, backbone by backbone without reduction, and on the pair. On
-    the diagonal, 80 % confident means right in 80 % of the cases; below it, a classifier is overconfident. The
-    number is the calibration error of the samples of all seeds together (pooled ECE); the tables have the mean of
-    each seed's own, in which deviations of opposite sign cancel less. Vertical lines are Wilson's intervals (95 %) of
-    independent samples.""",
-    name="frame_reliability",
-    needs=("compared_backbone",),
-    prediction_files="predictions/{frames}/{unreduced}/seed{seed}.csv",
-)
-def draw_frame_reliability(run: Run, prediction_files: Paths) -> Figure:
-    import pandas as pd
-
-    parts: dict[str, list[Frame]] = {}
-    for path in prediction_files:
-        parts.setdefault(source_method_seed(path)[1], []).append(read_predictions(path))
-    samples = {}
-    for method, title in unreduced_methods(run.config["real_world"]).items():
-        if method in parts:
-            rows = pd.concat(parts[method])
-            rows = rows[(rows["split"] == "test") & ~rows["abstained"]]
-            scores_N_C = rows[[f"score_{concept}" for concept in concepts_of(rows)]].to_numpy(float)
-            right_N = (rows["concept_predicted"] == rows["concept_true"]).to_numpy()
-            samples[title] = scores_N_C.max(axis=1), right_N
-    if not samples:
-        raise InputError("predictions on depth frames", "cover none of these methods", "run them first")
-    return reliability_figure(samples, title_of_frames(run.config), BINS, least=1 / 3)

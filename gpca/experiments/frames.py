@@ -8,7 +8,6 @@ from typing import Any
 
 from gpca.declarations.result import Frame
 from gpca.evaluation.measures import read_metrics
-from gpca.experiments.explained import titles
 from gpca.frames.source import REAL_WORLD, resolve_datasets
 from gpca.objects.entry import title_of
 from gpca.reporting.words import dataset_in_words
@@ -60,12 +59,6 @@ def pretraining_of(frames: Mapping, encoder: str) -> dict[str, Any]:
     """How an encoder of frames is pretrained; those as published have changes of their own."""
     own = frames.get("published_pretraining", {}) if encoder in frames["published"].values() else {}
     return {**frames["pretraining"], **own} if frames["pretraining"] else {}
-
-
-def unreduced_methods(frames: Mapping) -> dict[str, str]:
-    """Titles of the explainers that read a whole embedding of a frame, or none."""
-    backbones = [name for name in reduced_backbones(frames) if name.endswith("-none")]
-    return {name: encoder_title(*name.split("-")) for name in backbones} | titles(frames["explainers"])
 
 
 def read_together(path: str | Path) -> Frame:

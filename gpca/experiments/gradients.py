@@ -1,23 +1,15 @@
-"""Gradients of GP-CA's scores: saliency of points, and TCAV."""
+"""Gradients of GP-CA's scores: points deleted by their saliency, and TCAV."""
 
 from __future__ import annotations
 
-from pathlib import Path
-
-import numpy as np
-
 from gpca.declarations.experiment import Experiment, LeftOut
 from gpca.declarations.plan import Run
-from gpca.declarations.result import Figure, Frame, Paths, figure, numbers, table
+from gpca.declarations.result import Frame, Paths, numbers, table
 from gpca.declarations.step import Step, encoder_of
 from gpca.encoders.registry import DIFFERENTIABLE, DGCNNOptions, EncoderSettings
 from gpca.errors import InputError
 from gpca.evaluation.measures import ALL, source_method_seed, tidy
-from gpca.io.arrays import REAL, WHOLE, load_arrays
 from gpca.io.csv_file import read_numbers
-from gpca.pairs.dataset import Registrations
-from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.figures.style import LIGHT_GRAY, SMALL_PT, blues, write_title
 from gpca.reporting.sheet import Row, Sheet, Show, crossed, mean_over_seeds, where
 from gpca.reporting.tables.builder import mean_over
 from gpca.reporting.tables.table import Cell, Column
@@ -56,7 +48,6 @@ FOLLOW = Step(
     },
     outputs={
         "deletions": "saliency/{source}/seed{*seed}.csv",
-        "maps": "saliency/{source}/seed{*seed}.npz",
         "tcav": "tcav/{source}/seed{*seed}.csv",
     },
     settings=lambda plan, wildcards: {
@@ -109,70 +100,6 @@ def collect(run: Run, deletions: Paths, tests: Paths) -> Frame:
 
 
 SECTION = "Beyond the paper: what explainers look at, and whether it carries over"
-
-
-@figure(
-    SECTION,
-    "Saliency maps",
-    """Which points GP-CA's score of the concept that it names reacts to most: the length of the gradient through
-    classifier and encoder, by rank among the points of the cloud. The model is gray.
-
-    For each concept, the correctly named test sample with the median score is shown.""",
-    needs=("gradient_source",),
-    registrations="registrations/{shown_source}/seed{first_seed}.npz",
-    maps="saliency/{shown_source}/seed{first_seed}.npz",
-    deletions="saliency/{shown_source}/seed{first_seed}.csv",
-)
-def saliency(run: Run, registrations: Path, maps: Path, deletions: Path) -> Figure:
-    loaded = Registrations.load(registrations)
-    shapes: dict[str, tuple[int | str, ...]] = {"sample": ("S",), "points": ("S", "N", 3), "saliency": ("S", "N")}
-    arrays = load_arrays(maps, shapes, {"sample": WHOLE, "points": REAL, "saliency": REAL})
-    rows = read_numbers(deletions, DELETION_COLUMNS, ("before",)).drop_duplicates("sample")
-    shown = {}
-    for concept in CONCEPTS:
-        candidates = rows[rows["concept"] == concept]
-        right = candidates[candidates["named"] == concept]
-        ordered = (candidates if right.empty else right).sort_values(["before", "sample"], kind="stable")
-        if len(ordered):
-            shown[concept] = int(ordered["sample"].iloc[(len(ordered) - 1) // 2])
-    test = {int(loaded.sample[row]): row for row in loaded.rows("test")}
-    numbers_of_maps = {int(sample): i for i, sample in enumerate(arrays["sample"])}
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-
-    from gpca.reporting.figures.cloud_views import widest_views
-    from gpca.reporting.figures.panels import panels
-
-    drawing, [axes] = panels(1, len(CONCEPTS), HEIGHT_IN)
-    for panel, concept in zip(axes, CONCEPTS, strict=True):
-        panel.set_axis_off()
-        if concept not in shown:
-            continue
-        sample = shown[concept]
-        points_N_3, saliency_N = (arrays[name][numbers_of_maps[sample]] for name in ("points", "saliency"))
-        target_Q_3 = loaded.target(test[sample])
-        view = widest_views(target_Q_3)[0]
-        target_Q_2, points_N_2 = target_Q_3 @ view.T, points_N_3 @ view.T
-        panel.scatter(target_Q_2[:, 0], target_Q_2[:, 1], s=0.6, c=LIGHT_GRAY, linewidths=0)
-        order = np.argsort(saliency_N, kind="stable")  # the salient points in front
-        colors = {"c": np.linspace(0, 1, len(order)), "cmap": blues(), "vmin": PALEST, "vmax": 1}
-        panel.scatter(points_N_2[order, 0], points_N_2[order, 1], s=5, linewidths=0, **colors)
-        panel.set_aspect("equal", adjustable="datalim")
-        score = rows.loc[rows["sample"] == str(sample), ["named", "before"]].iloc[0]
-        panel.set_title(f"{concept}: named {score['named']}, {score['before']:.2f}", fontsize=SMALL_PT + 1)
-    bar = drawing.colorbar(
-        ScalarMappable(Normalize(PALEST, 1), blues()), ax=axes, shrink=0.75, pad=0.01, ticks=(0, 0.5, 1)
-    )
-    bar.ax.set_ylim(0, 1)
-    bar.set_label("rank of the point's saliency", fontsize=SMALL_PT)
-    bar.ax.set_yticklabels(["least", "median", "most"], fontsize=SMALL_PT)
-    title = run.source_titles[run.config["figures"]["source"]]
-    write_title(drawing, f"{title}: points that GP-CA's score reacts to")
-    return drawing
-
-
-HEIGHT_IN = 2.75
-PALEST = -0.25  # rank at which the colors reach white; no point has it
 
 
 @table(

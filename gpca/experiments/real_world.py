@@ -164,8 +164,6 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
         "published_seed": published_seeds,
         "classic": classic,
         "frame_explainer": others,
-        "compared_backbone": list(frames["backbones"])[1:],
-        "unreduced": list(frame_rows.unreduced_methods(frames)),
         "condition": conditions,
         "posed_frames": [REAL_WORLD, *conditions],
         "condition_backbone": condition_backbones,

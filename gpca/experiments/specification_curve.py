@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from textwrap import shorten
 from typing import Annotated, Any, get_args
 
 import numpy as np
@@ -222,53 +221,39 @@ def table13_readings(run: Run, judged: Frame) -> Table:
     )
 
 
-ROW_IN, HEAD_IN = 0.165, 0.85  # height of a line, and of title and axis
-FARTHEST = 30.0  # times the close tolerance
 NUMBER = ["table", "row", "column"]  # what names a printed number
-LETTERS = 52  # of a number's name, which there is room for
+MOST_ACROSS = 12  # numbers that stand beside each other in a bin of the figure
 
 
 @figure(
     SECTION,
     "Readings of the unstated",
-    """Every reading of each group of choices, as its difference from the printed number that is not reproduced: a
-    line of dots per number. In the gray band, where the axis is linear, a reading is close.""",
+    """A dot for each number that is not reproduced, by the group of choices that the paper leaves open: the share of
+    the group's readings that are close to it. A number at zero is not explained by the group.""",
     name="readings",
     **VERDICTS,
 )
 def draw_readings(run: Run, judged: Frame) -> Figure:
-    """Readings of each number as dots in a line, and how many are close; the lines of a group stand below its name."""
+    """Share of close readings as a dot for each group and number; dots of one share stand side by side."""
     from gpca.reporting.figures.panels import panels
-    from gpca.reporting.figures.style import BLUE, GRAY, LIGHT_GRAY, SMALL_PT, write_title
+    from gpca.reporting.figures.style import BLUE, LIGHT_GRAY, SMALL_PT, write_title
 
-    missed = unresolved(judged)
-    by_group = {name: list(missed[missed["group"] == name].groupby(NUMBER, sort=False)) for name in GROUPS}
-    by_group = {name: lines for name, lines in by_group.items() if lines}
-    if not by_group:
+    shares = unresolved(judged).groupby(["group", *NUMBER], sort=False)["close"].mean()
+    groups = [name for name in GROUPS if name in shares.index.unique("group")]
+    if not groups:
         raise InputError("reading_verdicts.csv", "has no readings of these groups", "run the readings first")
-    figure, [[panel]] = panels(1, 1, HEAD_IN + ROW_IN * sum(len(lines) + 1 for lines in by_group.values()))
-    panel.axvspan(-1, 1, color=LIGHT_GRAY, alpha=0.6, linewidth=0)
-    panel.axvline(0, color=GRAY, linewidth=0.6)
-    names, headings = list[str](), list[int]()
-    for group, lines in by_group.items():
-        headings.append(len(names))
-        names.append(reading_words.group(group))
-        for (number_table, row, column), rows in lines:
-            y = len(names)
-            distance_R = np.sort(rows["distance"].to_numpy(float).clip(-FARTHEST, FARTHEST))
-            panel.plot(distance_R[[0, -1]], [y, y], color=GRAY, linewidth=0.6)
-            panel.scatter(distance_R, np.full(len(rows), y), s=9, color=BLUE, alpha=0.45, linewidths=0, zorder=3)
-            count = f"{rows['close'].sum():.0f} of {len(rows)}"
-            panel.text(1.01, y, count, transform=panel.get_yaxis_transform(), va="center", fontsize=SMALL_PT)
-            names.append(shorten(f"{number_table}: {row}, {column}", LETTERS, placeholder=" …"))
-    panel.set_yticks(range(len(names)), names, fontsize=SMALL_PT)
-    for heading in headings:
-        panel.get_yticklabels()[heading].set_fontweight("bold")
+    figure, [[panel]] = panels(1, 1, 0.6 + 0.34 * len(groups))
+    for y, group in enumerate(groups):
+        panel.axhline(y, color=LIGHT_GRAY, linewidth=0.6, zorder=0)
+        share_K, count_K = np.unique(np.round(100 * shares[group].to_numpy(float)), return_counts=True)
+        for share, count in zip(share_K, count_K, strict=True):
+            offset_N = (np.arange(count) % MOST_ACROSS - (min(count, MOST_ACROSS) - 1) / 2) * 0.7
+            lift_N = 0.16 * (np.arange(count) // MOST_ACROSS)
+            panel.scatter(share + offset_N, y - lift_N, s=7, color=BLUE, linewidths=0, zorder=3)
+        explained = f"{np.sum(shares[group] > 0)} of {len(shares[group])}"
+        panel.text(1.01, y, explained, transform=panel.get_yaxis_transform(), va="center", fontsize=SMALL_PT)
+    panel.set_yticks(range(len(groups)), [reading_words.group(name) for name in groups], fontsize=SMALL_PT)
     panel.tick_params(axis="y", length=0)
-    panel.set_ylim(len(names) - 0.4, -0.6)
-    panel.set_xscale("symlog", linthresh=1)
-    panel.set_xlim(-1.1 * FARTHEST, 1.1 * FARTHEST)
-    panel.set_xticks([-10, -1, 0, 1, 10], ["-10", "-1", "0", "1", "10"])
-    panel.set_xlabel("distance from the printed number (times what is close; linear up to it, logarithmic beyond)")
-    write_title(figure, f"Every reading of the unstated{stand_ins(run)}; right: how many are close")
+    panel.set(ylim=(len(groups) - 0.5, -0.6), xlim=(-5, 105), xlabel="readings that are close (% of the group's)")
+    write_title(figure, f"Numbers that are not reproduced{stand_ins(run)}; right: how many any reading produces")
     return figure

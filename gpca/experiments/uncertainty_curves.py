@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from gpca.attribution.learner_predictions import read_learner_predictions, sets_
 from gpca.declarations.plan import Run
 from gpca.declarations.result import Figure, figure
 from gpca.errors import InputError
+from gpca.evaluation.intervals import mean_interval
 from gpca.experiments.out_of_distribution import SECTION, learner_titles
 from gpca.pairs.shifted_sets import DISTANCES, with_training_like
 from gpca.reporting.figures import style
@@ -27,48 +28,39 @@ SETS = {  # those of which Table V, alone or under shift, has ρ
 COVERAGES = np.linspace(0, 1, 101)
 ENOUGH = 0.1  # the axis ignores smaller shares of the samples, where a single error decides the risk
 DISTANCE_BINS = 10  # of equally many samples
-BESIDE_OTHERS = "gpca"  # stands in the panels of the learners that the paper does not have
 PREDICTIONS, SET_FILES = "learners/{source}/{learner}/seed{seed}.csv", "shifted/{source}/seed{seed}.npz"
-OTHER_LOOKS: tuple[tuple[str, Any, float], ...] = (
-    *((color, "-", 1.1) for color in (style.BLACK, style.GREEN, style.PURPLE, style.GRAY)),
-    *((color, (0, (4, 2)), 1.1) for color in (style.BLACK, style.GREEN, style.PURPLE, style.GRAY)),
-    *((color, (0, (1, 1)), 1.1) for color in (style.BLACK, style.GREEN, style.VERMILION, style.ORANGE)),
-)
 
 
 @figure(
     SECTION,
     "Risk over coverage",
     """Share of errors among the most confident samples, over the share that is kept. The curve falls towards the left
-    if a classifier knows what it does not know; the axis may cut it below 10 %. The paper's classifiers are above,
-    the others below beside GP-CA. The area under it is the AURC of Table V (the paper's AUC).""",
+    if a classifier knows what it does not know; the axis may cut it below 10 %. Bands are 95 % intervals over the
+    seeds. The area under it is the AURC of Table V (the paper's AUC), which has every classifier.""",
     learned=(read_learner_predictions, {"prediction_files": PREDICTIONS}),
 )
 def coverage_risk(run: Run, learned: Mapping) -> Figure:
     shown, columns = _shown(run, learned)
-    paper, others = _paper_first(shown), [name for name in shown if name not in style.METHOD_LOOKS]
-    beside = [name for name in paper if name == BESIDE_OTHERS]
-    lines = [names for names in (paper, [*beside, *others] if others else []) if names]
-    looks = _looks(shown)
-    drawing, axes = _panels(len(lines), columns, 1.0 + 1.6 * len(lines), "coverage (%)")
+    drawing, [axes] = _panels(1, columns, 2.6, "coverage (%)")
     highest = 0.0
-    for (line, column), panel in np.ndenumerate(axes):
-        for learner in reversed(lines[line]):
+    for panel, source in zip(axes, columns, strict=True):
+        for learner in reversed(shown):
             risks = []
-            for rows in _of(learned, list(columns)[column], learner, "in_distribution"):
+            for rows in _of(learned, source, learner, "in_distribution"):
                 coverage, risk = risk_coverage(-rows["max_score"].to_numpy(), wrong(rows))
-                risks.append(np.interp(COVERAGES, coverage, risk))
+                risks.append(100 * np.interp(COVERAGES, coverage, risk))
             if risks:
-                mean = 100 * np.mean(risks, axis=0)
-                panel.plot(100 * COVERAGES, mean, **looks[learner])
+                mean, low, high = np.array([mean_interval(risk_R) for risk_R in np.transpose(risks)]).T
+                panel.plot(100 * COVERAGES, mean, **_look(learner))
+                band = {"color": _look(learner)["color"], "alpha": 0.15, "linewidth": 0}
+                panel.fill_between(100 * COVERAGES, np.maximum(low, 0), np.minimum(high, 100), **band)
                 highest = max(highest, float(mean[COVERAGES >= ENOUGH].max()))
         drawn = panel.get_lines()
         if drawn and not any(curve.get_ydata().any() for curve in drawn):
             panel.text(0.5, 0.5, "no errors", transform=panel.transAxes, ha="center", va="center")
-    for panel in axes[:, 0]:
-        panel.set_ylabel("errors among\nthe covered (%)")
-    axes[0, 0].set(xlim=(0, 100), ylim=(0, 1.05 * highest or 1))
-    _write_legend(drawing, shown, looks)
+    axes[0].set_ylabel("errors among\nthe covered (%)")
+    axes[0].set(xlim=(0, 100), ylim=(0, 1.05 * highest or 1))
+    _write_legend(drawing, shown)
     return drawing
 
 
@@ -101,10 +93,7 @@ def reliability(run: Run, learned: Mapping) -> Figure:
     learned=(read_learner_predictions, {"prediction_files": PREDICTIONS, "set_files": SET_FILES}),
 )
 def uncertainty_vs_distance(run: Run, learned: Mapping) -> Figure:
-    learners, columns = _shown(run, learned)
-    names = _paper_first(learners) or list(learners)[: len(style.METHOD_LOOKS)]
-    shown = {name: learners[name] for name in names}
-    looks = _looks(learners)
+    shown, columns = _shown(run, learned)
     parts = {key: sets_of(rows) for key, rows in learned.items() if key[0] in columns and key[1] in shown}
     down = [name for name in SETS if any(name in sets for sets in parts.values())]
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
@@ -113,12 +102,12 @@ def uncertainty_vs_distance(run: Run, learned: Mapping) -> Figure:
     for row, name in enumerate(down):
         for panel, source in zip(axes[row], columns, strict=True):
             samples = 0
-            for learner in reversed(names):
+            for learner in reversed(shown):
                 seeds = [sets[name] for key, sets in parts.items() if key[:2] == (source, learner) and name in sets]
                 if seeds:
                     distance, mean, half = distance_curve(seeds)
-                    panel.plot(distance, mean, **looks[learner])
-                    band = {"color": looks[learner]["color"], "alpha": 0.15, "linewidth": 0}
+                    panel.plot(distance, mean, **_look(learner))
+                    band = {"color": _look(learner)["color"], "alpha": 0.15, "linewidth": 0}
                     panel.fill_between(distance, np.maximum(mean - half, 0), mean + half, **band)
                     samples = sum(map(len, seeds))
             panel.text(0.03, 0.96, f"$n$ = {samples}", transform=panel.transAxes, va="top", fontsize=style.SMALL_PT)
@@ -129,7 +118,7 @@ def uncertainty_vs_distance(run: Run, learned: Mapping) -> Figure:
         panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         panel.xaxis.set_minor_locator(NullLocator())
     axes[0, 0].set_ylim(bottom=0)
-    _write_legend(drawing, shown, looks)
+    _write_legend(drawing, shown)
     style.write_title(drawing, "Means in bins of equally many of the n samples, and their 95 % intervals")
     return drawing
 
@@ -157,32 +146,27 @@ def distance_curve(seeds: Sequence) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     return np.array(medians), np.array(means), np.array(halves)
 
 
-def _looks(shown: Iterable[str]) -> dict[str, dict[str, Any]]:
-    """Color, line and width of every learner; those without a look of their own take `OTHER_LOOKS` in turn."""
-    others = iter(OTHER_LOOKS)
-    looks = {name: style.METHOD_LOOKS.get(name) or next(others, style.OTHER_LOOK) for name in shown}
-    return {name: dict(zip(("color", "linestyle", "linewidth"), look, strict=True)) for name, look in looks.items()}
+def _look(learner: str) -> dict[str, Any]:
+    """Color, line and width of a learner."""
+    return dict(
+        zip(("color", "linestyle", "linewidth"), style.METHOD_LOOKS.get(learner, style.OTHER_LOOK), strict=True)
+    )
 
 
-def _paper_first(learners: Iterable[str]) -> list[str]:
-    return [name for name in style.METHOD_LOOKS if name in set(learners)]
-
-
-def _write_legend(drawing: Figure, shown: Mapping[str, str], looks: Mapping[str, dict[str, Any]]) -> None:
+def _write_legend(drawing: Figure, shown: Mapping[str, str]) -> None:
     from matplotlib.lines import Line2D
 
-    ordered = [*_paper_first(shown), *(name for name in shown if name not in style.METHOD_LOOKS)]
-    legend_below(drawing, [Line2D([], [], label=shown[name], **looks[name]) for name in ordered])
+    legend_below(drawing, [Line2D([], [], label=title, **_look(name)) for name, title in shown.items()])
 
 
 def _shown(run: Run, learned: Mapping) -> tuple[dict[str, str], dict[str, str]]:
-    """Titles of the learners and of the sources that have predictions."""
+    """Titles of the classifiers that have a look of their own (else of all) and of the sources, with predictions."""
     present = [{key[place] for key in learned} for place in (0, 1)]
     sources = {name: title for name, title in run.source_titles.items() if name in present[0]}
     learners = {name: title for name, title in learner_titles(run.config).items() if name in present[1]}
     if not learners or not sources:
         raise InputError("learners", "have no predictions of these sources and learners", "run them first")
-    return learners, sources
+    return {name: learners[name] for name in style.METHOD_LOOKS if name in learners} or learners, sources
 
 
 def _of(learned: Mapping, source: str, learner: str, name: str) -> list:

@@ -20,7 +20,6 @@ import numpy as np
 
 from gpca.classifier.settings import GPCSettings
 from gpca.encoders.registry import EncoderSettings
-from gpca.io.arrays import save_arrays
 from gpca.io.csv_file import write_csv
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
@@ -65,7 +64,7 @@ def run(job: Job) -> None:
     from gpca.encoders.training import load_model
 
     settings, encoding = GradientSettings(**job.section("gradients")), EncoderSettings(**job.section("encoder"))
-    files = ("registrations", "encoders", "embeddings", "deletions", "maps", "tcav")
+    files = ("registrations", "encoders", "embeddings", "deletions", "tcav")
     for seed, *paths in progress(list(job.per_seed(*files)), f"gradients of {job.source}"):
         inputs, outputs, axes = paths[:3], paths[3:], (job.source, seed)
         with record_provenance(outputs, inputs, job.settings, seed=seed):
@@ -75,10 +74,8 @@ def run(job: Job) -> None:
             gpc = GPC(CONCEPTS, GPCSettings(**job.section("gpc")), *axes)
             gpc.fit(train.embedding, train.concept)
             encoder = load_model(inputs[1], encoding, axes=axes).encoder
-            rows, maps = deletions(encoder, gpc, registrations, *axes, encoding, settings)
-            write_csv(outputs[0], rows)
-            save_arrays(outputs[1], maps, axes)
-            write_csv(outputs[2], tcav(gpc, train, test, settings, *axes))
+            write_csv(outputs[0], deletions(encoder, gpc, registrations, *axes, encoding, settings))
+            write_csv(outputs[1], tcav(gpc, train, test, settings, *axes))
 
 
 def chosen_rows(registrations: Registrations, count: int) -> np.ndarray:
@@ -132,12 +129,11 @@ def deletions(
     seed: int,
     encoding: EncoderSettings,
     settings: GradientSettings,
-) -> tuple[pd.DataFrame, dict[str, np.ndarray]]:
+) -> pd.DataFrame:
     """Delete points of test samples in every order, and explain what is left with GP-CA.
 
     `DELETION_COLUMNS` by sample, order and share: the score of the concept that is named on the whole draw, before and
-    after, and the share of orders after which another one is named; and the arrays ``sample`` (S), ``points``
-    (S, N, 3) and ``saliency`` (S, N).
+    after, and the share of orders after which another one is named.
     """
     import pandas as pd
     import torch
@@ -145,7 +141,6 @@ def deletions(
     from gpca.encoders.training import draw_points
 
     records: list[tuple] = []
-    arrays: dict[str, list] = {"sample": [], "points": [], "saliency": []}
     for row in chosen_rows(registrations, settings.samples):
         sample = int(registrations.sample[row])
         cloud_1_N_3: Any = draw_points(registrations, np.array([row]), encoding.draw_points, source, seed, "saliency")
@@ -153,8 +148,6 @@ def deletions(
         (before_C,) = _scores(encoder, gpc, cloud_1_N_3)
         named = int(before_C.argmax())
         salient = saliencies(points_N_3, point_gradient(encoder, gpc, cloud_1_N_3, named))
-        for name, value in (("sample", sample), ("points", points_N_3), ("saliency", salient[GRADIENT])):
-            arrays[name].append(value)
         ways = orders(salient, source, seed, sample)
         for share in settings.deleted:
             kept = max(1, round((1 - share) * len(points_N_3)))
@@ -165,8 +158,7 @@ def deletions(
                 changed = np.mean(after_R_C.argmax(axis=1) != named)
                 scores = (before_C[named], after_R_C[:, named].mean(), changed)
                 records.append((sample, registrations.concept[row], gpc.classes[named], order, share, *scores))
-    maps = {name: np.array(values, np.float32 if name != "sample" else int) for name, values in arrays.items()}
-    return pd.DataFrame(records, columns=list(DELETION_COLUMNS)), maps
+    return pd.DataFrame(records, columns=list(DELETION_COLUMNS))
 
 
 def _scores(encoder: torch.nn.Module, gpc: GPC, clouds_B_N_3: torch.Tensor) -> np.ndarray:

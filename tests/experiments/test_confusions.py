@@ -4,12 +4,10 @@ import pytest
 
 from gpca.errors import InputError
 from gpca.evaluation.measures import TIDY_COLUMNS
-from gpca.experiments import confusions as confusions_figure
-from gpca.experiments.confusions import draw_confusions_figure, letters, pooled_confusions
+from gpca.experiments.confusions import MOST, draw_confusions, pooled_confusions
 
 CONCEPTS = ("noise", "pose", "overlap")
-SOURCES = {"cup": "Coffee Cup (procedural stand-in)", "ycb": "YCB (procedural stand-in)"}
-EXPLAINERS = {f"explainer_{i}": f"Explainer {i} with a title that is long (oracle)" for i in range(5)}
+EXPLAINERS = {f"explainer_{i}": f"Explainer {i} with a title that is long (oracle)" for i in range(6)}
 COUNTS = np.array([[8, 1, 0, 1], [3, 5, 2, 0], [0, 0, 10, 0]])  # last: abstained
 
 
@@ -27,86 +25,40 @@ def tidy(rows):
 
 @pytest.fixture
 def metrics():
-    """All explainers on both sources, two seeds; the last one only on one."""
+    """All explainers on two sources and two seeds."""
     random = np.random.default_rng(0)
-    rows = []
-    for source in SOURCES:
-        for explainer in EXPLAINERS:
-            if (source, explainer) != ("cup", "explainer_4"):
-                rows += [r for seed in (0, 1) for r in records(source, explainer, random.integers(0, 9, (3, 4)), seed)]
-    return tidy(rows)
+    axes = [(source, name, seed) for source in ("cup", "ycb") for name in EXPLAINERS for seed in (0, 1)]
+    return tidy([row for s, name, seed in axes for row in records(s, name, random.integers(0, 9, (3, 4)), seed)])
 
 
-def test_confusions_are_pooled_over_seeds_in_the_order_of_the_concepts():
-    metrics = tidy([*records("ycb", "shap", COUNTS, 0), *records("ycb", "shap", COUNTS, 1)])
+def test_confusions_are_pooled_over_sources_and_seeds_in_the_order_of_the_concepts():
+    metrics = tidy([*records("ycb", "shap", COUNTS, 0), *records("cup", "shap", COUNTS, 1)])
     accuracies = tidy([("attribution", "ycb", "shap", "accuracy", "all", 0, 0.5)])
     pooled = pooled_confusions(pd.concat([accuracies, metrics]))
-    assert list(pooled) == [("ycb", "shap")]
-    confusion = pooled["ycb", "shap"]
-    assert list(confusion.index) == list(CONCEPTS)
-    assert list(confusion.columns) == [*CONCEPTS, "abstained"]
-    np.testing.assert_array_equal(confusion, 2 * COUNTS)
+    assert list(pooled) == ["shap"]
+    assert list(pooled["shap"].index) == list(CONCEPTS)
+    assert list(pooled["shap"].columns) == [*CONCEPTS, "abstained"]
+    np.testing.assert_array_equal(pooled["shap"], 2 * COUNTS)
 
 
-def axes_of(draw, *arguments):
-    confusions_figure.use_style()
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots()
-    draw(axes, *arguments)
-    plt.close(figure)
-    return axes
+def test_a_matrix_shows_the_share_of_each_true_concept():
+    figure = draw_confusions(tidy(records("ycb", "explainer_0", COUNTS)), EXPLAINERS, (), "YCB")
+    [panel] = figure.axes
+    shown = ["80 %", "10 %", "0 %", "30 %", "50 %", "20 %", "0 %", "0 %", "100 %"]
+    assert [text.get_text() for text in panel.texts] == shown
 
 
-def test_a_matrix_shows_the_share_of_each_true_concept_and_bars_those_of_all():
-    confusion = pooled_confusions(tidy(records("ycb", "shap", COUNTS)))["ycb", "shap"]
-    shown = [text.get_text() for text in axes_of(confusions_figure.draw_matrix, confusion, True).texts]
-    assert shown == ["80", "10", "0", "30", "50", "20", "0", "0", "100"]
-    without_overlap = axes_of(confusions_figure.draw_matrix, confusion.loc[["noise", "pose"]], True)
-    assert [text.get_text() for text in without_overlap.texts] == shown[:6]
-    axes = axes_of(confusions_figure.draw_bars, confusion, True)
-    assert [bar.get_height() for bar in axes.patches] == pytest.approx([11 / 30, 6 / 30, 12 / 30, 1 / 30])
-    [dashes] = axes.collections
-    assert [segment[0][1] for segment in dashes.get_segments()] == pytest.approx([1 / 3] * 3)
-    assert [label.get_text() for label in axes.get_xticklabels()] == ["N", "P", "O", "–"]
-
-
-def test_where_none_abstains_there_is_no_bar_and_no_word_for_it():
-    rows = records("ycb", "explainer_0", COUNTS * [1, 1, 1, 0])
-    rows_of_others = records("cup", "other", COUNTS)
-    for part in (rows, rows + rows_of_others):
-        figure = draw_confusions_figure(tidy(part), SOURCES, EXPLAINERS)
-        assert [label.get_text() for label in figure.axes[1].get_xticklabels()] == ["N", "P", "O"]
-        assert not [text for text in figure.texts if "abstained" in text.get_text()]
-
-
-def test_letters_tell_concepts_apart_and_nominal_is_ok():
-    assert letters(["noise", "pose", "overlap"]) == ["N", "P", "O"]
-    assert letters(["pose", "position", "noise"]) == ["Pose", "Posi", "Nois"]
-    assert letters(["nominal", "noise", "pose", "overlap"]) == ["OK", "N", "P", "O"]
+def test_the_first_named_are_drawn_first_and_no_more_than_fit(metrics):
+    figure = draw_confusions(metrics, EXPLAINERS, ("explainer_5", "absent", "explainer_2"), "both")
+    shown = [panel.get_title().replace("\n", " ") for panel in figure.axes]
+    assert len(shown) == MOST
+    assert [title.split()[1] for title in shown] == ["5", "2", "0", "1"]
 
 
 def test_the_same_metrics_give_the_same_bytes(metrics, same_bytes):
-    same_bytes(lambda: draw_confusions_figure(metrics, SOURCES, EXPLAINERS))
-
-
-def test_nothing_overlaps_and_all_stays_on_the_page(metrics):
-    figure = draw_confusions_figure(metrics, SOURCES, EXPLAINERS)
-    assert len(figure.axes) == 2 * (2 * 5 - 1)
-    renderer = figure.canvas.get_renderer()
-    words = " ".join(text.get_text().replace("\n", " ") for text in figure.texts)
-    for title in (*SOURCES.values(), *EXPLAINERS.values()):
-        assert title in words
-    texts = [text.get_window_extent(renderer) for text in figure.texts]
-    panels = [axes.get_tightbbox(renderer) for axes in figure.axes]
-    for box in (*texts, *panels):
-        assert figure.bbox.x0 <= box.x0 and box.x1 <= figure.bbox.x1
-        assert figure.bbox.y0 <= box.y0 and box.y1 <= figure.bbox.y1
-    boxes = [*texts, *panels]
-    for number, first in enumerate(boxes):
-        assert not [box for box in boxes[number + 1 :] if first.overlaps(box)]
+    same_bytes(lambda: draw_confusions(metrics, EXPLAINERS, (), "both"))
 
 
 def test_metrics_without_these_confusions_are_refused(metrics):
-    with pytest.raises(InputError, match="are of none of these explainers and sources"):
-        draw_confusions_figure(metrics, SOURCES, {"other": "Other"})
+    with pytest.raises(InputError, match="are of none of these explainers"):
+        draw_confusions(metrics, {"other": "Other"}, (), "both")

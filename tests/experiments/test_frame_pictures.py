@@ -13,7 +13,6 @@ from gpca.evaluation.measures import write_metrics
 from gpca.experiments.frame_pictures import (
     choose_sample,
     covered,
-    draw_frame_reliability,
     draw_real_world_confusions,
     draw_real_world_example,
     draw_real_world_failures,
@@ -22,7 +21,6 @@ from gpca.experiments.frame_pictures import (
 )
 from gpca.experiments.frame_views import draw_scores
 from gpca.experiments.frames import read_together
-from gpca.explainers.registry import explainer_entry
 from gpca.frames.synthesis import OCCLUDER, FrameSettings, make_frame_registrations
 from gpca.io.csv_file import write_csv
 from gpca.pairs.perturbation import CONCEPTS
@@ -139,7 +137,7 @@ def test_files_of_other_samples_and_metrics_of_other_methods_are_refused(results
     write_csv(tmp_path / "poses.csv", poses[::-1])
     with pytest.raises(InputError, match="its samples differ from"):
         read_samples(tmp_path / "poses.csv", results / "real_rgbd/dgcnn-none/seed0.csv")
-    with pytest.raises(InputError, match="has no confusion of these backbones"):
+    with pytest.raises(InputError, match="are of none of these explainers"):
         draw_real_world_confusions(run_of("pointnet"), read_together(results / "metrics.csv"))
 
 
@@ -157,28 +155,3 @@ def test_scores_are_bars_with_their_deviation_and_the_truth_in_bold():
     ends = axes.collections[1].get_segments()[0]
     assert np.allclose(ends[:, 0], [0.5, 0.9])
     plt.close(figure)
-
-
-def predictions(folder, method, seed, confidence):
-    named = np.array(CONCEPTS)[np.arange(30) % 3]
-    true = np.where(np.arange(30) < 24, named, np.roll(named, 1))  # 80 % are right
-    rows = {"sample": range(30), "split": "test", "object": "a", "cluster": "lm 6"}
-    rows |= {"concept_true": true, "concept_predicted": named}
-    rows |= {f"score_{c}": np.where(named == c, confidence, (1 - confidence) / 2) for c in CONCEPTS}
-    path = folder / f"predictions/real_rgbd/{method}/seed{seed}.csv"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    pd.DataFrame(rows | {"abstained": False, "icp_calls": 0}).to_csv(path, index=False)
-    return path
-
-
-def test_a_panel_is_a_method_with_all_seeds_and_its_calibration_error(tmp_path):
-    files = [predictions(tmp_path, "dgcnn-none", seed, 0.8) for seed in (0, 1)]
-    files += [predictions(tmp_path, "gpca_pair", 0, 0.9)]
-    figure = draw_frame_reliability(run_of("dgcnn", "pointnet", explainers=["gpca_pair"]), files)
-    titles = [axes.get_title() for axes in figure.axes]
-    assert [title for title in titles if title] == [
-        "DGCNN\npooled ECE 0.000",
-        f"{explainer_entry('gpca_pair').title}\npooled ECE 0.100",
-    ]
-    with pytest.raises(InputError, match="cover none of these methods"):
-        draw_frame_reliability(run_of("pointnet"), files)

@@ -1,14 +1,9 @@
 """Saliency maps and the tables of deleted points and of TCAV."""
 
-import numpy as np
-import pandas as pd
 import pytest
 
 from gpca.declarations.plan import Run
-from gpca.experiments.gradients import collect, saliency, saliency_deletion, tcav
-from gpca.io.arrays import save_arrays
-from gpca.pairs.perturbation import CONCEPTS
-from gpca.steps.gradients import DELETION_COLUMNS
+from gpca.experiments.gradients import collect, saliency_deletion, tcav
 
 RUN = Run(
     {
@@ -58,26 +53,3 @@ def test_the_fall_is_that_of_the_score_and_its_excess_against_random(metrics):
     assert "| Tiny | Most salient first | 30.0 (+25.0) | 50.0 |" in text
     text = tcav(RUN, metrics).markdown()
     assert "| Tiny | noise | 100.0 | 2 | 25.0 | 0 | 90.0 |" in text
-
-
-@pytest.fixture
-def files(registrations, tmp_path):
-    """Maps of two test samples of each concept, of which the second is named right; of noise neither is."""
-    test = registrations.rows("test")
-    rows = np.concatenate([test[registrations.concept[test] == concept][:2] for concept in CONCEPTS])
-    random = np.random.default_rng(0)
-    maps = {"points": random.normal(size=(6, 30, 3)), "saliency": random.uniform(size=(6, 30))}
-    save_arrays(tmp_path / "maps.npz", {"sample": registrations.sample[rows], **maps})
-    records = []
-    for place, row in enumerate(rows):
-        true = registrations.concept[row]
-        named = true if place % 2 and true != "noise" else CONCEPTS[(CONCEPTS.index(true) + 1) % 3]
-        records.append((registrations.sample[row], true, named, "gradient", 0.25, 0.9 - place / 100, 0.5, 0))
-    pd.DataFrame(records, columns=list(DELETION_COLUMNS)).to_csv(tmp_path / "rows.csv", index=False)
-    registrations.save(tmp_path / "registrations.npz")
-    return [tmp_path / name for name in ("registrations.npz", "maps.npz", "rows.csv")]
-
-
-def test_one_sample_of_each_concept_is_drawn_named_right_where_there_is_one(files):
-    titles = [axes.get_title() for axes in saliency(RUN, *files).axes]
-    assert titles[:3] == ["noise: named pose, 0.89", "pose: named pose, 0.87", "overlap: named overlap, 0.85"]

@@ -81,4 +81,5 @@ def write_below(panel, words: str, **style) -> None:
 
 def in_lines(title: str, letters: int = 26) -> str:
     """Return the title with what stands in brackets in a line of its own, and no line much longer than `letters`."""
-    return "\n".join(line for part in title.replace(" (", "\n(").split("\n") for line in wrap(part, letters))
+    parts = title.replace(" (", "\n(").split("\n")
+    return "\n".join(line for part in parts for line in wrap(part, letters, break_on_hyphens=False))

@@ -32,6 +32,7 @@ SOURCE_COLOR = BLUE
 CONCEPT_COLORS = {"noise": ORANGE, "pose": PURPLE, "overlap": GREEN}
 CONCEPT_MARKERS = {"noise": "o", "pose": "s", "overlap": "^"}
 SMALL_PT = 7  # No letters are smaller.
+MOST_LEVELS = 2  # of 255 by which a palette may change a channel
 UNDATED = dict.fromkeys(("CreationDate", "ModDate", "Producer", "Creator"))  # metadata of a PDF
 
 # Where many methods share a panel, the paper's have a color, a line and a width, and all others are gray.
@@ -90,7 +91,7 @@ def save_png(figure, png_path: str | Path, dpi: int = 300) -> None:
     plt.close(figure)
     image = Image.open(drawn).convert("RGB")
     few = image.quantize(256, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
-    # A photograph, of which a channel would change by a twelfth, keeps its colors.
+    # Two equal colors stay equal: a channel changes by no more than rounding does.
     largest = np.asarray(ImageChops.difference(image, few.convert("RGB"))).max()
     with whole_file(png_path) as partial:
-        (few if largest <= 255 // 12 else image).save(partial, format="png", optimize=True, dpi=(dpi, dpi))
+        (few if largest <= MOST_LEVELS else image).save(partial, format="png", optimize=True, dpi=(dpi, dpi))
