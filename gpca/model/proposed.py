@@ -1,0 +1,129 @@
+"""Proposals for registrations whose errors are known: what a judge calls repaired is calibrated on them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gpca.alignment.icp import ICPSettings
+from gpca.causes.dataset import Causes
+from gpca.causes.descriptors import observed_pair
+from gpca.causes.settings import Moved
+from gpca.causes.truth import capped
+from gpca.guarantee.acceptance import accepted_below
+from gpca.io.arrays import TEXT
+from gpca.io.container import Container, array
+from gpca.model.repair import Proposals, by_icp, measured, propose
+from gpca.model.result import Calibrated, Evidence, ResultJudge
+from gpca.pairs.distances import ObservedPair
+from gpca.reenactment.surface import ModelSurface
+from gpca.rigid import inverse, transform
+
+FOLDS = 5  # of families, at most
+Errors = Callable[[int, np.ndarray], np.ndarray]  # row, poses T_target_source (n, 4, 4) -> errors (n,), diameters
+
+
+@dataclass(frozen=True)
+class Proposed(Container):
+    """The proposals for N registrations, P each: the registered pose, then others under K hypotheses.
+
+    Where a pair has fewer, its first proposal stands in the place of the others, with weight 0.
+    """
+
+    error_N_P: np.ndarray = array("N P", least=0)  # diameters, capped as those of causes
+    weight_N_P: np.ndarray = array("N P", least=0, most=1)
+    distance_N_P_K: np.ndarray = array("N P K", least=0)
+    hypothesis_N_K: np.ndarray = array("N K", least=0, most=1)  # probabilities
+    inlier_rmse_N_P: np.ndarray = array("N P", least=0)
+    fitness_N_P: np.ndarray = array("N P", least=0, most=1)
+    family_N: np.ndarray = array("N", TEXT)
+
+    def evidence(self, column: int) -> Evidence:
+        """What is read of one proposal of each registration."""
+        given = self.distance_N_P_K, self.inlier_rmse_N_P, self.fitness_N_P
+        distance_N_K, rmse_N, fitness_N = (values[:, column] for values in given)
+        return Evidence(distance_N_K, self.hypothesis_N_K, rmse_N, fitness_N)
+
+    def at(self, row: int) -> Proposals:
+        """Return the proposals for one registration, without their poses."""
+        count = self.error_N_P.shape[1]
+        evidence = Evidence(
+            self.distance_N_P_K[row],
+            np.tile(self.hypothesis_N_K[row], (count, 1)),
+            self.inlier_rmse_N_P[row],
+            self.fitness_N_P[row],
+        )
+        return Proposals(np.tile(np.eye(4), (count, 1, 1)), self.weight_N_P[row], evidence)
+
+    def judge(self) -> ResultJudge:
+        """Return a judge that learned from the registered poses."""
+        return ResultJudge.fit(self.evidence(0), self.error_N_P[:, 0])
+
+    def probabilities(self, judge: ResultJudge, tolerance: float) -> np.ndarray:
+        """Return the probability (N, P) of each pose to be off by more than the tolerance."""
+        columns = range(self.error_N_P.shape[1])
+        return np.column_stack([judge.probability(self.evidence(column), tolerance) for column in columns])
+
+    def folds(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Yield rows of some families, and rows of all others."""
+        from sklearn.model_selection import GroupKFold
+
+        count = min(FOLDS, len(np.unique(self.family_N)))
+        if count > 1:
+            yield from GroupKFold(count).split(self.family_N, groups=self.family_N)
+
+
+def propose_for(
+    pair: ObservedPair, T_K: np.ndarray, weight_K: np.ndarray, icp: ICPSettings, moved: Moved, surface: ModelSurface
+) -> Proposals:
+    """Return the proposals for a pair under hypotheses (K, 4, 4), refined by the registration's own ICP."""
+    before, registered = transform(pair.T_init, pair.observed), inverse(pair.T_init)
+    refine, measure = by_icp(pair.model, icp), measured(before, pair.model, icp, moved)
+    return propose(before, surface, registered, T_K, weight_K, refine, measure)
+
+
+def proposed_for_all(
+    causes: Causes, T_N_K: np.ndarray, weight_N_K: np.ndarray, errors: Errors, icp: ICPSettings, moved: Moved
+) -> Proposed:
+    """Return the proposals for every registration, by the hypotheses (N, K, 4, 4) of its re-enactment."""
+    proposals, error_N = [], []
+    for row, (T_K, weight_K) in enumerate(zip(T_N_K, weight_N_K, strict=True)):
+        pair = observed_pair(causes, row)
+        proposals.append(propose_for(pair, T_K, weight_K, icp, moved, ModelSurface(pair.model)))
+        error_N.append(capped(errors(row, proposals[-1].T_n)))
+    return joined(proposals, error_N, causes.registrations.cluster)
+
+
+def joined(proposals: Sequence[Proposals], errors: Sequence[np.ndarray], family_N: np.ndarray) -> Proposed:
+    """Return proposals for N registrations, under as many hypotheses each, with the errors of their poses."""
+    columns: list[tuple] = []
+    for each, error_n in zip(proposals, errors, strict=True):
+        evidence, count = each.evidence, 1 + each.evidence.weight_N_K.shape[1]
+        row_P = np.where(np.arange(count) < len(error_n), np.arange(count), 1)
+        weight_P = np.where(np.arange(count) < len(error_n), each.weight_n[row_P], 0)
+        measured_P = evidence.inlier_rmse_N[row_P], evidence.fitness_N[row_P]
+        columns.append((error_n[row_P], weight_P, evidence.distance_N_K[row_P], evidence.weight_N_K[0], *measured_P))
+    error, weight, distance, hypothesis, rmse, fitness = (np.array(column) for column in zip(*columns, strict=True))
+    return Proposed(error, weight, distance, hypothesis, rmse, fitness, np.asarray(family_N))
+
+
+def with_repair(levels: Sequence[Calibrated], proposed: Proposed) -> tuple[Calibrated, ...]:
+    """Return the levels with the probability below which a pose is called repaired.
+
+    The samples are registrations that are called failed, by judges that learned from other families, and the proposal
+    for each that is most probably right; of those called repaired, few are off (`accepted_below`).
+    """
+    probability_L_N_P = np.zeros((len(levels), *proposed.error_N_P.shape))
+    for seen, unseen in proposed.folds():
+        judge, asked = proposed.subset(seen).judge(), proposed.subset(unseen)
+        probability_L_N_P[:, unseen] = [asked.probabilities(judge, level.tolerance) for level in levels]
+    calibrated = []
+    for level, probability_N_P in zip(levels, probability_L_N_P, strict=True):
+        called = np.flatnonzero(probability_N_P[:, 0] >= level.threshold)
+        best_n = 1 + probability_N_P[called, 1:].argmin(axis=1)
+        off_n = proposed.error_N_P[called, best_n] > level.tolerance
+        below = accepted_below(probability_N_P[called, best_n], off_n, proposed.family_N[called])
+        calibrated.append(replace(level, repaired_below=below))
+    return tuple(calibrated)

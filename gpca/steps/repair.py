@@ -1,0 +1,331 @@
+"""Step ``repair_attempts``: what repair and registration methods make of registrations, good and failed (Table XX).
+
+Whether a pose is accepted is decided later, by judges and limits of other families (:mod:`gpca.steps.repair_verdicts`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from time import perf_counter
+from typing import Annotated, Any
+
+import numpy as np
+
+from gpca.alignment.batched_icp import BatchedICP
+from gpca.alignment.icp import ICPSettings
+from gpca.alignment.methods.interface import Outcome, Pair
+from gpca.alignment.methods.registry import make_method
+from gpca.alignment.pose_error import displacements
+from gpca.causes.dataset import Causes, labels_of
+from gpca.causes.descriptors import observed_pair
+from gpca.causes.measuring import Subject
+from gpca.causes.scans import OverlapErrors
+from gpca.causes.settings import OBSERVED, CauseSettings, Moved
+from gpca.causes.truth import capped
+from gpca.errors import InputError
+from gpca.io.arrays import TEXT, WHOLE
+from gpca.io.container import Container, array
+from gpca.io.csv_file import ANY, numbers, read_csv, write_csv
+from gpca.jobs.job import Job
+from gpca.jobs.provenance import record_provenance
+from gpca.model.proposed import Proposed, joined, propose_for
+from gpca.model.repair import Proposals, measured
+from gpca.objects.canonical import ObjectClouds
+from gpca.pairs.distances import ObservedPair
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.process.progress import progress
+from gpca.reenactment.dataset import Reenactments
+from gpca.reenactment.hypotheses import find_hypotheses, search_starts, weights_of
+from gpca.reenactment.scans import REACH
+from gpca.reenactment.settings import ReenactmentSettings
+from gpca.reenactment.surface import ModelSurface
+from gpca.rigid import exp, inverse, inverses, transform
+from gpca.scans.pair import near
+from gpca.seeds import generator, seed_of
+from gpca.settings import Bounds, Count, read_settings
+
+REPAIR, LIKELIEST, STARTS, MANY_STARTS = "repair", "likeliest", "starts", "many_starts"
+BUILT_IN = (LIKELIEST, STARTS, MANY_STARTS)  # rivals that are no methods of the registry
+TESTS = ("fitness", "inlier_rmse", "trimmed_cost", "spread", "weight")  # of a pose; the smaller, the surer
+NEVER = 1e6  # score of a pose that is not accepted
+TRIMMED = 0.8  # share of the distances that a trimmed cost counts, the smallest
+RUNS = 13  # of ICP around a pose, for its spread,
+RUN_ROTATION_DEG, RUN_TRANSLATION = 10.0, 0.05  # root mean square offsets of their starts
+
+
+@dataclass(frozen=True)
+class RepairSettings:
+    """What is asked about.
+
+    Attributes:
+        samples: test registrations of each file, at most.
+        points: of each cloud that the rivals register, at most.
+        methods: registration methods beside those built in -> their settings.
+    """
+
+    samples: Count = 1000
+    points: Annotated[int, Bounds(minimum=64, maximum=65536)] = 2048
+    methods: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Attempts(Container):
+    """What was proposed for N registrations, and what M rivals made of them, in C = P + M columns.
+
+    The first P columns are those of :class:`gpca.model.proposed.Proposed`, which declares the arrays.
+    """
+
+    sample_N: np.ndarray = array("N", WHOLE)
+    group_N: np.ndarray = array("N", TEXT)  # kind of start on frames; else the same for all
+    cluster_N: np.ndarray = array("N", TEXT)  # that the bootstrap draws
+    label_N: np.ndarray = array("N", TEXT)  # dominant cause of a failure by its mean error; ``none`` of any other
+    points_N: np.ndarray = array("N", WHOLE)  # of the smaller cloud
+    error_N_C: np.ndarray = array("N C", least=0)
+    weight_N_C: np.ndarray = array("N C", least=0, most=1)
+    distance_N_C_K: np.ndarray = array("N C K", least=0)
+    hypothesis_N_K: np.ndarray = array("N K", least=0, most=1)
+    inlier_rmse_N_C: np.ndarray = array("N C", least=0)
+    fitness_N_C: np.ndarray = array("N C", least=0, most=1)
+    family_N: np.ndarray = array("N", TEXT)
+    score_N_M_Q: np.ndarray = array(f"N M {len(TESTS)}")
+    method_M: np.ndarray = array("M", TEXT)
+
+    def columns(self, first: int, last: int | None) -> Proposed:
+        """Return some columns as if they were proposals."""
+        chosen = slice(first, last)
+        return Proposed(
+            self.error_N_C[:, chosen],
+            self.weight_N_C[:, chosen],
+            self.distance_N_C_K[:, chosen],
+            self.hypothesis_N_K,
+            self.inlier_rmse_N_C[:, chosen],
+            self.fitness_N_C[:, chosen],
+            self.family_N,
+        )
+
+    @property
+    def proposed(self) -> Proposed:
+        """The proposals."""
+        return self.columns(0, self.hypothesis_N_K.shape[1] + 1)
+
+    @property
+    def rivals(self) -> Proposed:
+        """What the rivals found, a column each."""
+        return self.columns(self.hypothesis_N_K.shape[1] + 1, None)
+
+
+def attempt(job: Job) -> None:
+    """Ask about the test registrations of a file of causes; scans and frames bring samples and re-enactments."""
+    settings, axes = read_settings(RepairSettings, job.section("repair")), (job.source, job.seed)
+    truth = CauseSettings.from_dict(job.section("causes"), job.section("icp"))
+    reenactment = read_settings(ReenactmentSettings, job.section("reenactment"))
+    optional = {name: job.get(name) for name in ("objects", "samples", "reenactments")}
+    inputs = [job.causes, *(path for path in optional.values() if path)]
+    with record_provenance([job.attempts, job.timings], inputs, job.settings, seed=job.seed):
+        causes = Causes.load(job.causes, axes)
+        about = read_csv(path := optional["samples"], ("sample",), others=ANY) if optional["samples"] else None
+        read = Reenactments.load(optional["reenactments"], causes.registrations) if optional["reenactments"] else None
+        rows = causes.rows("test")
+        if about is not None and "times" in about:  # scans with added noise are left out
+            rows = rows[(numbers(path, about, "times") == 0).to_numpy()[rows]]
+        if about is not None and "truth" in about:
+            rows = rows[(about["truth"] == "annotated").to_numpy()[rows]]
+        rows = np.sort(generator(*axes, "repair", "samples").permutation(rows)[: settings.samples])
+        if not len(rows):
+            raise InputError(job.causes, "has no registration to repair", "raise its number of test samples")
+        asked = causes.subset(rows)
+        if about is not None:
+            about = about.iloc[rows].reset_index(drop=True)
+        moved = OBSERVED if about is not None and "error_factor" in about else truth.moved
+        world = World(asked, about, optional["objects"] and ObjectClouds.load(optional["objects"], job.source))
+        weight_K, T_K = (None, None) if read is None else (read.weight[rows], read.T_model_observed[rows])
+
+        def hypotheses(pair: ObservedPair, row: int) -> tuple[np.ndarray, np.ndarray]:
+            if T_K is not None and weight_K is not None:
+                return T_K[row], weight_K[row]
+            return searched(pair, reenactment)
+
+        attempts, seconds = try_all(asked, world, settings, truth.icp, moved, hypotheses, axes)
+        attempts.save(job.attempts, axes)
+        write_csv(job.timings, seconds)
+
+
+class World:
+    """What is known of registrations for judging poses of them."""
+
+    def __init__(self, causes: Causes, about: Any, objects: ObjectClouds | None) -> None:
+        self.causes, self.about, self._objects = causes, about, objects
+        self._subjects: dict[tuple[int, bool], Subject] = {}
+
+    def errors(self, row: int, T_n: np.ndarray) -> np.ndarray:
+        """Return the errors (n,) of poses T_target_source (n, 4, 4), in diameters."""
+        registrations = self.causes.registrations
+        T_true = registrations.T_target_source("true", row)
+        off_n = np.array([T_true @ inverse(T) for T in T_n])
+        if self._objects is None:
+            return capped(self._overlap_errors(row, T_true)(off_n))
+        key = int(registrations.object_index[row]), bool(self.causes.symmetric[row])
+        if key not in self._subjects:
+            self._subjects[key] = Subject.of(self._objects, *key)
+        return capped(self._subjects[key].errors(off_n))
+
+    def _overlap_errors(self, row: int, T_true: np.ndarray) -> OverlapErrors:
+        registrations = self.causes.registrations
+        points, target = transform(T_true, registrations.source(row)), registrations.target(row).astype(np.float64)
+        common_N = near(points, target, REACH * ModelSurface(target).spacing)
+        return OverlapErrors(points[common_N] if common_N.any() else points, float(self.about["error_factor"][row]))
+
+    @cached_property
+    def columns(self) -> dict[str, Any]:
+        """The columns of :class:`Attempts` that say what the registrations are."""
+        causes, registrations = self.causes, self.causes.registrations
+        count, cluster_N, group_N = len(causes), registrations.cluster, np.full(len(causes), "all")
+        if self.about is not None and "dataset" in self.about:
+            cluster_N = (self.about["dataset"] + " " + self.about["scene"].astype(str)).to_numpy(str)
+            group_N = np.where(self.about["start"] == "native", "native", "disturbed")
+        named_N = labels_of(causes.truth)
+        sizes = [min(len(registrations.source(row)), len(registrations.target(row))) for row in range(count)]
+        return {
+            "sample_N": registrations.sample,
+            "group_N": group_N,
+            "cluster_N": cluster_N,
+            "label_N": np.where(np.isin(named_N, CONCEPTS), named_N, "none"),
+            "points_N": np.array(sizes),
+        }
+
+
+def searched(pair: ObservedPair, settings: ReenactmentSettings) -> tuple[np.ndarray, np.ndarray]:
+    """Return hypotheses (K, 4, 4) of a pair's true pose and their probabilities (K,), as a re-enactment has them.
+
+    Where there are fewer, the first fills up, with probability 0.
+    """
+    before, T_runs_n = transform(pair.T_init, pair.observed), pair.T_runs @ inverse(pair.T_init)
+    random = generator(*pair.axes, "hypotheses")
+    hypotheses = find_hypotheses(before, ModelSurface(pair.model), T_runs_n, settings, random)
+    missing = settings.hypotheses - len(hypotheses)
+    T_K = np.array([hypothesis.T for hypothesis in hypotheses + hypotheses[:1] * missing])
+    return T_K, np.pad(weights_of(hypotheses), (0, missing))
+
+
+def try_all(
+    causes: Causes,
+    world: World,
+    settings: RepairSettings,
+    icp: ICPSettings,
+    moved: Moved,
+    hypotheses: Callable[[ObservedPair, int], tuple[np.ndarray, np.ndarray]],
+    axes: tuple,
+) -> tuple[Attempts, Any]:
+    """Return the attempts at every registration, and a frame of the seconds of each method."""
+    import pandas as pd
+
+    methods = {name: make_method(name, entry) for name, entry in settings.methods.items()}
+    proposals, errors, columns, seconds = [], [], [], []
+    registrations = causes.registrations
+    for row in progress(range(len(causes)), f"repairs of {axes[0]}, seed {axes[1]}"):
+        pair = observed_pair(causes, row, *axes, "reenactment")
+        started = perf_counter()
+        T_K, weight_K = hypotheses(pair, row)
+        surface = ModelSurface(pair.model)
+        proposals.append(propose_for(pair, T_K, weight_K, icp, moved, surface))
+        errors.append(world.errors(row, proposals[-1].T_n))
+        rival = Rivals(pair, surface, icp, settings.points, proposals[-1], perf_counter() - started)
+        tried = [*rival.built_in(), *(rival.by(name, method, warm=row == 0) for name, method in methods.items())]
+        T_M = np.array([each.T for each in tried])
+        fitness_M, rmse_M = measured(rival.before, pair.model, icp, moved)(T_M)
+        distance_M_K = np.stack([surface.errors(T @ inverses(T_K)) for T in T_M])
+        score_M_Q = np.array([each.score_Q for each in tried])
+        columns.append((world.errors(row, T_M), distance_M_K, rmse_M, fitness_M, score_M_Q))
+        spent = {REPAIR: rival.repair_seconds} | {each.name: each.seconds for each in tried}
+        seconds += [(int(registrations.sample[row]), *each) for each in spent.items()]
+    proposed = joined(proposals, errors, registrations.cluster)
+    error_N_M, distance_N_M_K, rmse_N_M, fitness_N_M, score_N_M_Q = map(np.array, zip(*columns, strict=True))
+    attempts = Attempts(
+        **world.columns,
+        error_N_C=np.hstack([proposed.error_N_P, error_N_M]),
+        weight_N_C=np.hstack([proposed.weight_N_P, np.zeros_like(error_N_M)]),
+        distance_N_C_K=np.hstack([proposed.distance_N_P_K, distance_N_M_K]),
+        hypothesis_N_K=proposed.hypothesis_N_K,
+        inlier_rmse_N_C=np.hstack([proposed.inlier_rmse_N_P, rmse_N_M]),
+        fitness_N_C=np.hstack([proposed.fitness_N_P, fitness_N_M]),
+        family_N=registrations.cluster,
+        score_N_M_Q=score_N_M_Q,
+        method_M=np.array([*BUILT_IN, *methods]),
+    )
+    return attempts, pd.DataFrame(seconds, columns=["sample", "method", "seconds"])
+
+
+@dataclass(frozen=True)
+class Tried:
+    """What a rival found."""
+
+    name: str
+    T: np.ndarray  # 4×4, takes what was observed, before the registration, to the model
+    score_Q: np.ndarray  # of `TESTS`
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Rivals:
+    """The rivals of a repair, on one pair."""
+
+    pair: ObservedPair
+    surface: ModelSurface
+    icp: ICPSettings
+    points: int
+    proposals: Proposals
+    repair_seconds: float
+
+    @cached_property
+    def before(self) -> np.ndarray:
+        """(N, 3) what was observed, before the registration, in the model's frame."""
+        return transform(self.pair.T_init, self.pair.observed)
+
+    @cached_property
+    def registrar(self) -> BatchedICP:
+        """The registration's ICP, of the observed cloud to the model."""
+        return BatchedICP(self.pair.model, self.icp)
+
+    def built_in(self) -> list[Tried]:
+        """Return `BUILT_IN`."""
+        starts_n = search_starts(self.before, self.pair.model)
+        T_runs_n = self.pair.T_runs @ inverse(self.pair.T_init)
+        first, weight = self.proposals.T_n[1], float(self.proposals.weight_n[1])
+        return [
+            self._tried(LIKELIEST, perf_counter() - self.repair_seconds, first, 1 - weight),
+            self._tried(STARTS, perf_counter(), self._best(T_runs_n)),
+            self._tried(MANY_STARTS, perf_counter(), self._best(self.registrar.register(self.before, starts_n)[0])),
+        ]
+
+    def by(self, name: str, method: Callable[[Pair], Outcome], warm: bool) -> Tried:
+        """Return the pose of a registration method, refined where that lowers the trimmed cost; all start alike."""
+        rows = generator(*self.pair.axes, "repair", "points").permutation(len(self.before))[: self.points]
+        pair = Pair(self.before[rows], self.pair.model[: self.points], seed=seed_of(*self.pair.axes, "repair", name))
+        if warm:  # no time includes what a method loads or compiles
+            method(pair.with_normals())
+        started = perf_counter()
+        outcome = method(pair.with_normals())
+        refined = self.registrar.register(self.before, outcome.T_target_source[None])[0]
+        T = self._best(np.concatenate([outcome.T_target_source[None], refined]))
+        return self._tried(name, started, T, failed=not outcome.converged)
+
+    def _tried(self, name: str, started: float, T: np.ndarray, doubt: float = 1.0, failed: bool = False) -> Tried:
+        _, fitness_n, rmse_n = self.registrar.register(self.before, T[None], max_iterations=0)
+        scores = (1 - fitness_n[0], rmse_n[0], self._trimmed_cost(T), self._spread(T), doubt)
+        score_Q = np.full(len(TESTS), NEVER) if failed or not fitness_n[0] else np.array(scores)
+        return Tried(name, T, score_Q, perf_counter() - started)
+
+    def _best(self, T_n: np.ndarray) -> np.ndarray:
+        return T_n[int(np.argmin([self._trimmed_cost(T) for T in T_n]))]
+
+    def _trimmed_cost(self, T: np.ndarray) -> float:
+        squared_N = np.sort(np.square(self.surface.tree.query(transform(T, self.before))[0]))
+        return float(squared_N[: max(1, int(TRIMMED * len(squared_N)))].mean())
+
+    def _spread(self, T: np.ndarray) -> float:
+        deviation_6 = np.repeat([np.deg2rad(RUN_ROTATION_DEG), RUN_TRANSLATION], 3) / np.sqrt(3)
+        xi_n_6 = generator(*self.pair.axes, "repair", "spread").normal(size=(RUNS, 6)) * deviation_6
+        ends_n, _, _ = self.registrar.register(self.before, exp(xi_n_6) @ T)
+        return float(np.sqrt(np.square(displacements(ends_n @ inverse(T), transform(T, self.before))).mean()))

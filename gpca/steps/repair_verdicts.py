@@ -1,0 +1,125 @@
+"""Step ``repair_verdicts``: which poses are accepted, by judges and limits of other families (Table XX)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.guarantee.acceptance import accepted_below
+from gpca.io.csv_file import write_csv
+from gpca.jobs.job import Job
+from gpca.jobs.provenance import record_provenance
+from gpca.model.diagnoser import threshold_of
+from gpca.model.proposed import with_repair
+from gpca.model.repair import REPAIRED, SEVERAL, decide
+from gpca.model.result import Calibrated, ResultJudge
+from gpca.steps.repair import REPAIR, TESTS, Attempts
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+CAUSES, HARD = "causes", "hard"  # tracks whose families judges and limits come from; and that share these
+JUDGED = "judged"  # after a rival's name: its pose is accepted by the judge
+FALSE_ALARMS = 0.05  # share of the good registrations of other families that are called failed
+COLUMNS = ("failed", "called", "replaced", "right", "right_pose", "several")
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What one fold's families tell: the judge, its level, and the test and limit by which each rival is accepted."""
+
+    judge: ResultJudge
+    level: Calibrated
+    tests: Mapping[str, tuple[int, float | None]]  # of a rival: the number of its test, or of the judge; its limit
+
+
+def verdicts(attempts: Mapping[str, Sequence[tuple[str, int, Attempts]]], tolerance: float) -> pd.DataFrame:
+    """Return a row for each track, source, seed, sample and method.
+
+    Args:
+        attempts: track -> source, seed and attempts of each of its files.
+        tolerance: largest error of a right pose, in diameters.
+    """
+    import pandas as pd
+
+    learned = Attempts.joined([each for _, _, each in attempts[CAUSES]])
+    limits_of: dict[str, Limits] = {}
+    for seen, unseen in learned.proposed.folds():
+        limits = learn_limits(learned.subset(seen), tolerance)
+        limits_of |= dict.fromkeys(learned.family_N[unseen].tolist(), limits)
+    every = learn_limits(learned, tolerance)
+    frames = []
+    for track, files in attempts.items():
+        for source, seed, each in files:
+            for row, family in enumerate(each.family_N.tolist()):
+                limits = limits_of.get(family, every) if track in (CAUSES, HARD) else every
+                for method, said in decided(each, row, limits, tolerance):
+                    named = (track, source, seed, each.sample_N[row], each.group_N[row], each.cluster_N[row])
+                    frames.append((*named, each.label_N[row], each.points_N[row], method, *said))
+    names = ("track", "source", "seed", "sample", "group", "cluster", "label", "points", "method", *COLUMNS)
+    return pd.DataFrame(frames, columns=list(names))
+
+
+def learn_limits(learned: Attempts, tolerance: float) -> Limits:
+    """Learn from registrations of some families; judges of others of these set the limits."""
+    proposed, rivals = learned.proposed, learned.rivals
+    result_N, judged_N_M = np.zeros(len(learned)), np.zeros(rivals.error_N_P.shape)
+    for seen, unseen in proposed.folds():
+        judge = proposed.subset(seen).judge()
+        result_N[unseen] = proposed.subset(unseen).probabilities(judge, tolerance)[:, 0]
+        judged_N_M[unseen] = rivals.subset(unseen).probabilities(judge, tolerance)
+    off_N = proposed.error_N_P[:, 0] > tolerance
+    threshold = threshold_of(result_N[~off_N], FALSE_ALARMS)
+    [level] = with_repair([Calibrated(tolerance, threshold)], proposed)
+    called, tests = np.flatnonzero(result_N >= threshold), {}
+    for m, name in enumerate(learned.method_M.tolist()):
+        wrong_n = rivals.error_N_P[called, m] > tolerance
+        family_n, score_n_Q = learned.family_N[called], learned.score_N_M_Q[called, m]
+        below_Q = [accepted_below(score_n, wrong_n, family_n) for score_n in score_n_Q.T]
+        # As many as are repaired there decide on the test.
+        gain_Q = [
+            -1 if below is None else int(((score_n < below) & ~wrong_n & off_N[called]).sum())
+            for score_n, below in zip(score_n_Q.T, below_Q, strict=True)
+        ]
+        best = int(np.argmax(gain_Q))
+        tests[name] = best, below_Q[best]
+        judged_n = judged_N_M[called, m]
+        tests[f"{name}_{JUDGED}"] = len(TESTS), accepted_below(judged_n, wrong_n, family_n)
+    return Limits(proposed.judge(), level, tests)
+
+
+def decided(each: Attempts, row: int, limits: Limits, tolerance: float) -> Iterator[tuple[str, tuple]]:
+    """Yield `COLUMNS` of repair and of every rival, for one registration."""
+    alone = each.subset(np.array([row]))
+    proposed, rivals = alone.proposed, alone.rivals
+    error_P, error_M = proposed.error_N_P[0], rivals.error_N_P[0]
+    verdict = decide(limits.judge, limits.level, proposed.at(0), tolerance)
+    failed, called = bool(error_P[0] > tolerance), bool(verdict.probability_n[0] >= limits.level.threshold)
+    right_P = error_P <= tolerance
+    replaced, best = verdict.name == REPAIRED, 1 + int(verdict.probability_n[1:].argmin())
+    several = verdict.name == SEVERAL and bool(right_P[list(verdict.rows)].any())
+    yield REPAIR, (failed, called, replaced, bool(replaced and right_P[best]), bool(right_P[best]), several)
+    judged_M = rivals.probabilities(limits.judge, tolerance)[0]
+    for m, name in enumerate(each.method_M.tolist()):
+        for method in (name, f"{name}_{JUDGED}"):
+            test, below = limits.tests[method]
+            score = judged_M[m] if test == len(TESTS) else alone.score_N_M_Q[0, m, test]
+            replaced, right = bool(called and below is not None and score < below), bool(error_M[m] <= tolerance)
+            yield method, (failed, called, replaced, replaced and right, right, False)
+
+
+def run(job: Job) -> None:
+    """Decide on the attempts of all tracks -> ``repairs/verdicts.csv``."""
+    files: dict[str, list[Path]] = {}
+    for path in job.attempts:
+        files.setdefault(path.parts[-3], []).append(path)
+    with record_provenance([job.verdicts], job.attempts, job.settings):
+        attempts = {
+            track: [(path.parent.name, int(path.stem.removeprefix("seed")), Attempts.load(path)) for path in paths]
+            for track, paths in files.items()
+        }
+        write_csv(job.verdicts, verdicts(attempts, job.settings["tolerance"]))
