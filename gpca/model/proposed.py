@@ -15,7 +15,7 @@ from gpca.causes.truth import capped
 from gpca.guarantee.acceptance import accepted_below
 from gpca.io.arrays import TEXT
 from gpca.io.container import Container, array
-from gpca.model.repair import Proposals, by_icp, measured, propose
+from gpca.model.repair import Proposals, by_mixture, measured, propose
 from gpca.model.result import Calibrated, Evidence, ResultJudge
 from gpca.pairs.distances import ObservedPair
 from gpca.reenactment.surface import ModelSurface
@@ -78,9 +78,9 @@ class Proposed(Container):
 def propose_for(
     pair: ObservedPair, T_K: np.ndarray, weight_K: np.ndarray, icp: ICPSettings, moved: Moved, surface: ModelSurface
 ) -> Proposals:
-    """Return the proposals for a pair under hypotheses (K, 4, 4), refined by the registration's own ICP."""
+    """Return the proposals for a pair under hypotheses (K, 4, 4), as a repair refines them."""
     before, registered = transform(pair.T_init, pair.observed), inverse(pair.T_init)
-    refine, measure = by_icp(pair.model, icp), measured(before, pair.model, icp, moved)
+    refine, measure = by_mixture(pair.model, surface.spacing), measured(before, pair.model, icp, moved)
     return propose(before, surface, registered, T_K, weight_K, refine, measure)
 
 

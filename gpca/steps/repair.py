@@ -31,13 +31,13 @@ from gpca.io.csv_file import ANY, numbers, read_csv, write_csv
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.model.proposed import Proposed, joined, propose_for
-from gpca.model.repair import Proposals, measured
+from gpca.model.repair import Proposals, measured, search
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.distances import ObservedPair
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
 from gpca.reenactment.dataset import Reenactments
-from gpca.reenactment.hypotheses import find_hypotheses, search_starts, weights_of
+from gpca.reenactment.hypotheses import search_starts
 from gpca.reenactment.scans import REACH
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
@@ -201,12 +201,9 @@ def searched(pair: ObservedPair, settings: ReenactmentSettings) -> tuple[np.ndar
 
     Where there are fewer, the first fills up, with probability 0.
     """
-    before, T_runs_n = transform(pair.T_init, pair.observed), pair.T_runs @ inverse(pair.T_init)
-    random = generator(*pair.axes, "hypotheses")
-    hypotheses = find_hypotheses(before, ModelSurface(pair.model), T_runs_n, settings, random)
-    missing = settings.hypotheses - len(hypotheses)
-    T_K = np.array([hypothesis.T for hypothesis in hypotheses + hypotheses[:1] * missing])
-    return T_K, np.pad(weights_of(hypotheses), (0, missing))
+    T_k, weight_k = search(pair, settings, ModelSurface(pair.model))
+    missing = settings.hypotheses - len(T_k)
+    return np.concatenate([T_k, *[T_k[:1]] * missing]), np.pad(weight_k, (0, missing))
 
 
 def try_all(

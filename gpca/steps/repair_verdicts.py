@@ -57,9 +57,9 @@ def verdicts(attempts: Mapping[str, Sequence[tuple[str, int, Attempts]]], tolera
         for source, seed, each in files:
             for row, family in enumerate(each.family_N.tolist()):
                 limits = limits_of.get(family, every) if track in (CAUSES, HARD) else every
-                for method, said in decided(each, row, limits, tolerance):
+                for method, outcome in decided(each, row, limits, tolerance):
                     named = (track, source, seed, each.sample_N[row], each.group_N[row], each.cluster_N[row])
-                    frames.append((*named, each.label_N[row], each.points_N[row], method, *said))
+                    frames.append((*named, each.label_N[row], each.points_N[row], method, *outcome))
     names = ("track", "source", "seed", "sample", "group", "cluster", "label", "points", "method", *COLUMNS)
     return pd.DataFrame(frames, columns=list(names))
 
