@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+
+from gpca.errors import InputError
+from gpca.io.arrays import require_numbers
 
 
 @dataclass(frozen=True)
@@ -21,6 +24,17 @@ class Attribution:
     seconds_N: np.ndarray  # time of the explanation
     icp_seconds_N: np.ndarray  # the part of it inside ICP
 
+    def __post_init__(self) -> None:
+        """Refuse what code from outside cannot have meant."""
+        if not all(isinstance(each, str) for each in self.concepts) or len(set(self.concepts)) < len(self.concepts):
+            raise InputError("concepts", f"are {self.concepts!r}", "give different names")
+        shape = len(require_numbers(self.scores_N_C, (None, len(self.concepts)), "scores_N_C")), len(self.concepts)
+        require_numbers(self.variances_N_C, shape, "variances_N_C", finite=False)
+        require_numbers(self.bald_N, shape[:1], "bald_N", finite=False)
+        require_numbers(self.abstained_N, shape[:1], "abstained_N", kinds="b")
+        for name in ("icp_calls_N", "seconds_N", "icp_seconds_N"):
+            require_numbers(getattr(self, name), shape[:1], name)
+
     @classmethod
     def of_scores(
         cls,
@@ -35,7 +49,7 @@ class Attribution:
         bald_N: np.ndarray | None = None,
     ) -> Attribution:
         """Make the attribution of an explainer; times and calls are one number for each row, or one for all."""
-        n = len(scores_N_C)
+        n = len(require_numbers(scores_N_C, (None, len(concepts)), "scores_N_C"))
         return cls(
             concepts=concepts,
             scores_N_C=scores_N_C,
@@ -46,6 +60,12 @@ class Attribution:
             seconds_N=np.broadcast_to(seconds, n).astype(float),
             icp_seconds_N=np.broadcast_to(icp_seconds, n).astype(float),
         )
+
+    def in_order(self, concepts: tuple[str, ...]) -> Attribution:
+        """Return it with its columns in another order."""
+        columns = [self.concepts.index(concept) for concept in concepts]
+        scores_N_C, variances_N_C = self.scores_N_C[:, columns], self.variances_N_C[:, columns]
+        return replace(self, concepts=concepts, scores_N_C=scores_N_C, variances_N_C=variances_N_C)
 
     @property
     def predicted_N(self) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, Namespace
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from gpca.io.files import PAGE, require_apart, require_outputs, write_text
 from gpca.jobs.arguments import COUNT
 from gpca.tracks import leaderboard
 from gpca.tracks.published import FOLDER, Published
-from gpca.tracks.submission import read_submission
+from gpca.tracks.submission import LINK_REMEDY, is_link, read_submission
 from gpca.tracks.track import DEFAULT, TRACKS, Track, track_of
 
 LARGEST_BYTES = 10**7  # of the published predictions of all tracks, which are kept in git
@@ -41,6 +42,8 @@ def run_bench(options: Namespace) -> None:
     from gpca.tracks.trial import try_method
 
     track = track_of(options.track)
+    if not is_link(options.link):
+        raise InputError("--link", f"is '{options.link[:40]}'", LINK_REMEDY)
     module = options.method.replace(".", "/")  # if it is below the working directory
     require_apart(options, ["out"], [module, f"{module}.py", cache_of(track)])
     names = _method_names(options.method, track)
@@ -79,7 +82,7 @@ def _method_names(method: str, track: Track) -> list[str]:
             require_known("explainer", method, explainer_names)
     variable = "CAUSE_EXPLAINERS" if track.kind == CAUSES else "EXPLAINERS"
     entries = getattr(load(method), variable, None)
-    if not entries:
+    if not entries or not isinstance(entries, Mapping):
         fault = f"lists no {variable}, whom the track {track.name} asks"
         raise InputError(method, fault, f"give it {variable} = {{'my_method': ExplainerEntry(…)}}")
     use([*named(), method])

@@ -69,6 +69,25 @@ class Encoding(Protocol):
         """Train the encoder on labeled registrations; return a function that attaches its embeddings."""
 
 
+def answer_of(
+    explainer: ConceptExplainer, registrations: Registrations, labels: tuple[str, ...] = CONCEPTS
+) -> Attribution:
+    """Return what an explainer answers, with its columns in the order of the labels; InputError for what cannot be."""
+    subject, count = f"explainer {type(explainer).__name__}", len(registrations)
+    try:
+        answer = explainer.explain(registrations)
+    except InputError as refused:
+        raise InputError(subject, str(refused)) from refused
+    if not isinstance(answer, Attribution):
+        raise InputError(subject, f"answers with a {type(answer).__name__}", "make it by Attribution.of_scores")
+    if len(answer.scores_N_C) != count:
+        fault = f"answers for {len(answer.scores_N_C)} registrations, and is asked about {count}"
+        raise InputError(subject, fault, "give one row of scores for each, in their order")
+    if set(answer.concepts) != set(labels):
+        raise InputError(subject, f"scores {', '.join(answer.concepts)}", f"score {', '.join(labels)}")
+    return answer if answer.concepts == labels else answer.in_order(labels)
+
+
 class ScoringExplainer:
     """Base of explainers that give scores for their `labels`; it measures the time."""
 

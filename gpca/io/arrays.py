@@ -94,6 +94,29 @@ def load_arrays(
     return arrays
 
 
+def require_numbers(
+    values: object, shape: tuple[int | None, ...], name: str, kinds: str = f"b{REAL}", finite: bool = True
+) -> np.ndarray:
+    """Return an array that code from outside made; InputError unless it is one, of this shape, and of plain numbers.
+
+    None stands for any size.
+    """
+    wanted = "×".join("N" if size is None else str(size) for size in shape)
+    fault = ""
+    if not isinstance(values, np.ndarray):
+        fault = f"is of type {type(values).__name__}, not an array of NumPy"
+    elif values.dtype.kind not in kinds or values.dtype.itemsize > max(_FLOAT_BYTES):
+        fault = f"has type {values.dtype}"
+    elif values.ndim != len(shape) or any(b not in (a, None) for a, b in zip(values.shape, shape, strict=True)):
+        fault = f"has shape {'×'.join(map(str, values.shape)) or 'scalar'}, not {wanted}"
+    elif finite and not (np.abs(values) <= LARGEST_NUMBER).all():
+        fault = f"contains NaN, infinity or numbers above {LARGEST_NUMBER:.0e}"
+    if fault:
+        raise InputError(name, fault, f"give plain numbers, {wanted}")
+    assert isinstance(values, np.ndarray)
+    return values
+
+
 def axes_in(arrays: Mapping[str, np.ndarray]) -> Axes:
     """Return the source and the seed that arrays name; objects of a source have no seed."""
     return str(arrays["source"]), int(arrays["seed"]) if "seed" in arrays else None

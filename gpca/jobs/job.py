@@ -15,6 +15,7 @@ from typing import Any, TextIO
 
 from gpca.errors import InputError
 from gpca.process.environment import missing
+from gpca.process.plugins import place_in_plugin
 from gpca.process.processor import prepare
 from gpca.process.progress import certain_interrupts
 
@@ -142,8 +143,10 @@ def _as_process(prefix: str = "") -> Iterator[SimpleNamespace]:
         line, process.status = "stopped; repeat the command to continue", 130
     except MemoryError:
         line, process.status = "this machine ran out of memory; use smaller settings or another machine", 2
-    except (InputError, OSError, ModuleNotFoundError) as fault:
-        line, process.status = missing(fault) if isinstance(fault, ModuleNotFoundError) else str(fault), 2
+    except (Exception, SystemExit) as fault:
+        line, process.status = str(fault) if isinstance(fault, InputError) else place_in_plugin(fault), 2
+        if line is None and isinstance(fault, OSError | ModuleNotFoundError):
+            line = str(fault) if isinstance(fault, OSError) else missing(fault)
         if line is None:
             raise
     if line is not None:

@@ -13,8 +13,10 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import sys
 import sysconfig
+import traceback
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from importlib import import_module, metadata
@@ -24,6 +26,7 @@ from types import ModuleType
 from typing import Any
 
 from gpca.errors import InputError
+from gpca.io.files import is_name
 
 GROUPS = {  # group of entry points -> variables of its modules
     "gpca.explainers": ("EXPLAINERS", "CAUSE_EXPLAINERS"),
@@ -69,8 +72,15 @@ def entries_outside(variable: str, kind: str, of: type, taken: Iterable[str]) ->
         if not isinstance(entries, Mapping):
             raise InputError(module_name, f"{variable} is not a mapping", f"give names, each with its {of.__name__}")
         for name, entry in entries.items():
+            if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z0-9][\w.-]*", name, re.ASCII):
+                raise InputError(
+                    module_name, f"{variable} has the name {name!r}", "use letters, digits and underscores"
+                )
             if not isinstance(entry, of):
                 raise InputError(module_name, f"{variable}['{name}'] is {_a(type(entry))}", f"make it {_a(of)}")
+            title = name if isinstance(entry, str) else getattr(entry, "title", name)
+            if not isinstance(title, str) or not is_name(title):
+                raise InputError(module_name, f"{variable}['{name}'] has the title {title!r}", "give a line of text")
             if name in names:
                 raise InputError(module_name, f"there is another {kind} '{name}'", "choose a name of your own")
             names.add(name)
@@ -121,6 +131,15 @@ def load(name: str) -> ModuleType:
     return module
 
 
+def place_in_plugin(fault: BaseException) -> str | None:
+    """Return where a plugin failed, and how; None for a fault elsewhere."""
+    for frame, line in reversed([*traceback.walk_tb(fault.__traceback__)]):
+        if str(frame.f_globals.get("__name__")).partition(".")[0] in ROOTS:
+            kind, words = type(fault).__name__, " ".join(str(fault).split())
+            return f"{frame.f_code.co_filename}, line {line}: {kind}{': ' * bool(words)}{words}"
+    return None
+
+
 def lone_root(top: str) -> Path | None:
     """Return the folder of a plugin that is a file, with its helper modules; None for an installed package."""
     root = ROOTS.get(top)
@@ -139,7 +158,7 @@ def _imported(module: str, subject: str) -> ModuleType:
         return import_module(module)
     except InputError:
         raise
-    except Exception as fault:  # of a user's code
+    except (Exception, SystemExit) as fault:  # of a user's code
         raise InputError(subject, f"cannot be imported ({type(fault).__name__}: {fault})", "correct it") from fault
 
 

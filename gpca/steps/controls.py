@@ -18,7 +18,7 @@ from gpca.attribution.predictions import prediction_frame
 from gpca.classifier.scores import Attribution
 from gpca.encoders.registry import EncoderSettings
 from gpca.explainers.gpca import GPCA_FORMS
-from gpca.explainers.interface import BARE, Describing, Encoding, ExplainerEntry
+from gpca.explainers.interface import BARE, Describing, Encoding, ExplainerEntry, answer_of
 from gpca.explainers.registry import Embed, described_for, make_rivals
 from gpca.io.csv_file import write_csv
 from gpca.jobs.job import Job
@@ -186,7 +186,7 @@ class ControlRun:
         changed = self._changed(HARD, self.hard, {})
         explainer, test = self.rivals[name].make(), changed.subset(changed.rows("test"))
         explainer.fit(changed.subset(changed.rows("train")))
-        attribution = explainer.explain(test.without_labels())
+        attribution = answer_of(explainer, test.without_labels())
         return attribution, float(attribution.seconds_N.mean())
 
     def _changed(self, control: str, plain: Registrations, embeds: Mapping[str, Attach]) -> Registrations:
@@ -260,7 +260,7 @@ class ControlRun:
                 with self.costs.count_learning(control, name):
                     explainer.fit(train)
                 for (name_of_test, source), test in asked.items():
-                    attribution = explainer.explain(test.without_labels())
+                    attribution = answer_of(explainer, test.without_labels())
                     if name_of_test == PAPER:
                         self.costs.explaining[name] = float(attribution.seconds_N.mean())
                     frame = prediction_frame(test, attribution)

@@ -20,7 +20,7 @@ from gpca.causes.truth import BORDERLINE
 from gpca.classifier.scores import Attribution
 from gpca.encoders.registry import EncoderSettings
 from gpca.errors import InputError
-from gpca.explainers.interface import BARE, EMBEDDINGS, REENACTED, ExplainerEntry, icp_calls
+from gpca.explainers.interface import BARE, EMBEDDINGS, REENACTED, ExplainerEntry, answer_of, icp_calls
 from gpca.explainers.registry import CAUSES, explainer_entry
 from gpca.io.csv_file import write_csv
 from gpca.jobs.job import Job
@@ -102,7 +102,9 @@ def explained(
     explainer.fit(registrations.subset(training_rows(registrations, path)))
     starts = causes.T_target_source_runs.shape[1]
     calls = icp_calls(entry.sees, starts, remedies, reenactment.calls(starts) if reenactment else 0)
-    return replace(explainer.explain(observed_only(registrations)), icp_calls_N=np.full(len(registrations), calls))
+    return replace(
+        answer_of(explainer, observed_only(registrations), LABELS), icp_calls_N=np.full(len(registrations), calls)
+    )
 
 
 def training_rows(registrations: Registrations, path: Path) -> np.ndarray:
@@ -204,7 +206,7 @@ class World:
                     return None
                 explainer = entry.make(*self._axes, **settings)
                 explainer.fit(learned)
-                answers.append(explainer.explain(observed_only(asked.subset(rows))))
+                answers.append(answer_of(explainer, observed_only(asked.subset(rows)), LABELS))
             order = np.argsort(np.concatenate([rows for rows, _ in parts]))
             all_scores.append(np.concatenate([answer.scores_N_C for answer in answers])[order])
             all_abstained.append(np.concatenate([answer.abstained_N for answer in answers])[order])

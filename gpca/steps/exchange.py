@@ -13,7 +13,7 @@ from gpca.attribution.predictions import prediction_frame
 from gpca.classifier.scores import Attribution
 from gpca.encoders.registry import EncoderSettings
 from gpca.errors import InputError
-from gpca.explainers.interface import ExplainerEntry
+from gpca.explainers.interface import ExplainerEntry, answer_of
 from gpca.explainers.registry import Embed, described_for, explainer_entry, make_rivals
 from gpca.io.csv_file import write_csv
 from gpca.io.files import SPLITS
@@ -144,7 +144,7 @@ class Exchange:
                 explainer.fit(train.subset(train.rows("train")))
                 for asked_of, (tested, failure_S) in registered.items():
                     test = tested.subset(tested.rows("test"))
-                    frame = prediction_frame(test, explainer.explain(test.without_labels()))
+                    frame = prediction_frame(test, answer_of(explainer, test.without_labels()))
                     labels = METHOD, learnt_from, asked_of, explainer_name
                     yield labeled(frame, labels, failure_S[tested.rows("test")])
 
@@ -179,8 +179,8 @@ class Exchange:
                 scores_S_C, abstained_S = np.zeros((len(test), len(CONCEPTS))), np.ones(len(test), bool)
                 estimated = np.flatnonzero(failure_S == "")
                 if len(estimated):
-                    attributed = explainer.explain(
-                        test_estimates.attach_to(test.without_labels(), estimated, conditions, floor)
+                    attributed = answer_of(
+                        explainer, test_estimates.attach_to(test.without_labels(), estimated, conditions, floor)
                     )
                     scores_S_C[estimated], abstained_S[estimated] = attributed.scores_N_C, attributed.abstained_N
                 attribution = Attribution.of_scores(CONCEPTS, scores_S_C, seconds=0.0, abstained_N=abstained_S)

@@ -19,7 +19,7 @@ from gpca.attribution.predictions import read_predictions
 from gpca.causes.dataset import LABELS, Causes, labeled, observed_only
 from gpca.causes.truth import BORDERLINE
 from gpca.errors import InputError
-from gpca.explainers.interface import EMBEDDINGS, REENACTED
+from gpca.explainers.interface import EMBEDDINGS, REENACTED, answer_of
 from gpca.explainers.registry import CAUSES, explainer_entry
 from gpca.frames.source import REAL_WORLD
 from gpca.guarantee.answers import SCORES, Scored
@@ -111,7 +111,7 @@ def scored_anew(registrations: Registrations, samples: Scored, name: str, settin
     for part in np.unique(part_N).tolist():
         explainer = explainer_entry(name, CAUSES).make("guarantee", part, **settings)
         explainer.fit(registrations.subset(np.flatnonzero(part_N == part)))
-        scores[part] = explainer.explain(hidden).scores_N_C
+        scores[part] = answer_of(explainer, hidden, LABELS).scores_N_C
     first_N_4 = next(iter(scores.values()))
     if all(np.array_equal(scores_N_4, first_N_4) for scores_N_4 in scores.values()):
         yield replace(samples, model=np.full(len(samples), "untrained"), scores=first_N_4)

@@ -144,7 +144,7 @@ def reduce(job: Job) -> None:
 
 def attribute(job: Job) -> None:
     """Fit an explainer to the training rows and explain every row, seed by seed -> predictions and timings."""
-    from gpca.explainers.interface import Describing
+    from gpca.explainers.interface import Describing, answer_of
     from gpca.explainers.registry import explainer_entry
     from gpca.uncertainty.outcomes import Outcomes, read_seconds
     from gpca.uncertainty.settings import CONDITIONS
@@ -178,7 +178,7 @@ def attribute(job: Job) -> None:
             train = registrations.rows("train")
             if len(train):  # a design may cover the test samples alone; what reads it learns nothing
                 explainer.fit(replace(registrations, attached=observed.attached).subset(train))
-            attribution = explainer.explain(observed)
+            attribution = answer_of(explainer, observed)
             write_predictions(predictions, registrations, attribution)
             write_timings(
                 timings,

@@ -24,7 +24,7 @@ import numpy as np
 
 from gpca.errors import InputError
 from gpca.io.files import is_name, require_file, whole_file
-from gpca.numerals import decimal, whole
+from gpca.numerals import LARGEST_NUMBER, decimal, whole
 from gpca.tracks.published import NO_CALLS, NOTHING_NAMED, Method, Published
 from gpca.tracks.track import TRACKS
 
@@ -40,6 +40,7 @@ HEAD = {  # required entry -> its description
 OPTIONAL = {"reads": "what it sees of a registration", "icp_calls": "runs of ICP beyond the one that it explains"}
 KEYS = ("source", "seed", "sample")
 NO_LINK = "none"
+LINK_REMEDY = f"give an address that begins with https://, or {NO_LINK}"
 NAMED = "named"  # optional column: the predicted label, empty for none; by default that of the largest score
 LARGEST_BYTES = 10**8
 MOST_FAULTS = 20  # in the list
@@ -111,8 +112,8 @@ def _read_head(lines: list[str], published: Published, fault: Fault) -> dict[str
     elif head.get("version", version) != version:
         other = f"is of version '{head['version']}' of the samples, and these are of {version}"
         fault("", other, "predict these: gpca.load makes them")
-    if (link := head.get("link", NO_LINK)) != NO_LINK and not link.startswith(("https://", "http://")):
-        fault("", f"'link' is '{link[:40]}'", f"give an address that begins with https://, or {NO_LINK}")
+    if not is_link(link := head.get("link", NO_LINK)):
+        fault("", f"'link' is '{link[:40]}'", LINK_REMEDY)
     for key, read in (("seconds", decimal), ("icp_calls", whole)):
         text = head.get(key, "")
         try:
@@ -161,9 +162,12 @@ def _read_rows(
         seen[row] = number
         for column, name in enumerate(scores):
             try:
-                scores_N_C[row, column] = decimal(entry[name].strip())
+                scores_N_C[row, column] = value = decimal(entry[name].strip())
+                if abs(value) > LARGEST_NUMBER:
+                    raise ValueError
             except ValueError:
-                fault(line, f"'{name}' is '{entry[name][:40]}', no finite number", "give a number")
+                words = f"'{name}' is '{entry[name][:40]}', no finite number up to {LARGEST_NUMBER:.0e}"
+                fault(line, words, "give a number")
         label = entry.get(NAMED, "").strip()
         if NAMED not in entry:
             named_N[row] = scores_N_C[row].argmax()
@@ -178,6 +182,10 @@ def _read_rows(
         words = f"{len(missing)} of {len(needed)} test samples are missing, first source {source}, seed {seed}"
         fault("", f"{words}, sample {sample}", "give every sample once")
     return scores_N_C, named_N
+
+
+def is_link(text: str) -> bool:
+    return text == NO_LINK or text.startswith(("https://", "http://"))
 
 
 def track_in_head(path: Path) -> str:

@@ -16,7 +16,6 @@ from gpca.causes.dataset import Causes
 from gpca.causes.settings import OBJECTS, DescriptorSettings
 from gpca.classifier.scores import Attribution
 from gpca.encoders.registry import EncoderSettings
-from gpca.errors import InputError
 from gpca.experiments.scan_causes import diagnosis_settings
 from gpca.explainers.interface import BARE, EMBEDDINGS, REENACTED, ExplainerEntry
 from gpca.explainers.registry import explainer_entry, make_rivals, require_settings
@@ -86,10 +85,6 @@ def try_method(
         answers = [explain(trial, source, seed) for source, seed, _ in parts]
     scores_N_C, named_N = np.full((len(rows), len(track.labels)), np.nan), np.full(len(rows), NOTHING_NAMED)
     for (_, _, part_rows), answer in zip(parts, answers, strict=True):
-        if answer.scores.shape != (len(part_rows), len(track.labels)) or not np.isfinite(answer.scores).all():
-            fault = f"gives scores of shape {answer.scores.shape}, or such as are no finite numbers"
-            remedy = f"give one of {', '.join(track.labels)} for each of the {len(part_rows)} registrations"
-            raise InputError(f"explainer '{name}'", fault, remedy)
         scores_N_C[part_rows], named_N[part_rows] = answer.scores, answer.named
     calls = round(float(np.mean([answer.calls for answer in answers])))
     seconds = float(np.mean([answer.seconds for answer in answers]))

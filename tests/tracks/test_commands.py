@@ -3,9 +3,12 @@
 import json
 import re
 
+import numpy as np
 import pytest
 
 from gpca.__main__ import main
+from gpca.classifier.scores import Attribution
+from gpca.pairs.perturbation import CONCEPTS
 from gpca.process import plugins
 from gpca.tracks import leaderboard
 from gpca.tracks.leaderboard import MARK
@@ -39,13 +42,66 @@ def test_an_explainer_of_the_suite_can_be_run_again(published, run, apart, capsy
         (["causes", "none_such"], "explainer 'none_such': unknown; choose one of "),
         (["hard", "my_method.py"], "my_method.py: lists no EXPLAINERS, whom the track hard asks; give it EXPLAINERS"),
         (["clouds", "my_method.py"], "track 'clouds': unknown; choose one of causes, hard, frames"),
+        (
+            ["causes", "my_method.py", "--link", "javascript:alert(1)"],
+            "--link: is 'javascript:alert(1)'; give an address",
+        ),
+        (["causes", "leaves.py"], "leaves.py: cannot be imported (SystemExit: 0)"),
+        (["causes", "number.py"], "number.py: lists no CAUSE_EXPLAINERS"),
+        (["causes", "above.py"], "CAUSE_EXPLAINERS has the name '../x'; use letters, digits and underscores"),
+        (["causes", "two_lines.py"], "has the title 'a\\n# link: b'; give a line of text"),
         (["causes", "my_method.py", "--settings", json.dumps({"sharp": 1})], "setting sharp: unknown"),
     ],
 )
-def test_a_method_that_cannot_be_asked_is_refused_in_one_line(words, line, method, published, run, capsys):
+def test_a_method_that_cannot_be_asked_is_refused_in_one_line(words, line, method, published, run, tmp_path, capsys):
+    text = (tmp_path / method).read_text()
+    (tmp_path / "leaves.py").write_text("raise SystemExit(0)\n")
+    (tmp_path / "number.py").write_text("CAUSE_EXPLAINERS = 5\n")
+    (tmp_path / "above.py").write_text(text.replace('{"rmse"', '{"../x"'))
+    (tmp_path / "two_lines.py").write_text(text.replace("RMSE below its median", "a\\n# link: b"))
     assert main(["bench", *words, "--samples", str(run)]) == 2
     said = [text for text in capsys.readouterr().err.splitlines() if "learning and" not in text]
     assert len(said) == 1 and line in said[0]
+
+
+SUMMARY = "    def summary(self, registrations):\n        n = len(registrations)\n        return {}, None, None\n"
+OTHER_LABELS = "    labels = ('noise', 'pose', 'overlap', {})\n" + SUMMARY.format("np.zeros((n, 4))")
+
+
+@pytest.mark.parametrize(
+    ("body", "line"),
+    [
+        (SUMMARY.format("None"), "explainer Own: scores_N_C: is of type NoneType, not an array"),
+        (SUMMARY.format("[[0.0] * 4] * n"), "is of type list"),
+        (SUMMARY.format("np.zeros(n)"), "not N×4"),
+        (SUMMARY.format("np.zeros((n + 1, 4))"), "answers for 21 registrations, and is asked about 20; give one row"),
+        (SUMMARY.format("np.zeros((n, 4), complex)"), "has type complex128"),
+        (SUMMARY.format("np.full((n, 4), np.longdouble('1e4000'))"), "has type float128"),
+        (SUMMARY.format("np.zeros((n, 4), 'M8[s]')"), "has type datetime64[s]"),
+        (SUMMARY.format("np.full((n, 4), np.nan)"), "contains NaN"),
+        (OTHER_LABELS.format("'fog'"), "scores noise, pose, overlap, fog; score nominal, noise, pose, overlap"),
+        (OTHER_LABELS.format("'pose'"), "concepts: are ('noise', 'pose', 'overlap', 'pose'); give different names"),
+        ("    def explain(self, registrations):\n        return 5\n", "answers with a int"),
+        (SUMMARY.format("1 / 0"), "own.py, line 10: ZeroDivisionError: division by zero"),
+        (SUMMARY.format("sys.exit(0)"), "own.py, line 10: SystemExit: 0"),
+    ],
+)
+def test_an_answer_that_cannot_be_is_refused_in_one_line(body, line, method, published, run, tmp_path, capsys):
+    head = (
+        "import sys\nimport numpy as np\nfrom gpca.causes.dataset import LABELS\n"
+        "from gpca.explainers.interface import ExplainerEntry, ScoringExplainer\n"
+        "class Own(ScoringExplainer):\n    labels = LABELS\n\n"
+    )
+    (tmp_path / "own.py").write_text(f"{head}{body}CAUSE_EXPLAINERS = {{'own': ExplainerEntry('Own', Own, ())}}\n")
+    assert main(["bench", "causes", "own.py", "--samples", str(run)]) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 2 and line in said[1]
+
+
+def test_scores_are_taken_by_the_names_of_their_labels():
+    scores_N_C = np.array([[0.1, 0.2, 0.7]])
+    answer = Attribution.of_scores(("pose", "overlap", "noise"), scores_N_C, seconds=0.0).in_order(CONCEPTS)
+    assert answer.scores_N_C.tolist() == [[0.7, 0.1, 0.2]] and answer.predicted_N.tolist() == ["noise"]
 
 
 def test_faults_of_predictions_are_lines_and_the_status_says_so(published, tmp_path, capsys):

@@ -9,6 +9,7 @@ import numpy as np
 
 from gpca.alignment.methods.interface import FailedRegistration, MethodEntry, Outcome, Pair
 from gpca.errors import InputError
+from gpca.io.arrays import require_numbers
 from gpca.process.environment import require_open3d
 from gpca.process.registry import Registry
 from gpca.settings import require_arguments
@@ -76,7 +77,11 @@ def make_method(name: str, settings: Mapping[str, object] | None = None) -> Call
             # Open3D's warnings go to standard output, and repeat the outcome.
             with threads.limit(limits=1), utility.VerbosityContextManager(utility.VerbosityLevel.Error):
                 outcome = align(pair, **settings)
-            if not np.isfinite(outcome.T_target_source).all():
+            if not isinstance(outcome, Outcome):
+                fault = f"returns a {type(outcome).__name__}"
+                raise InputError(f"registration method '{name}'", fault, "make it return an Outcome")
+            subject = f"registration method '{name}': its pose"
+            if not np.isfinite(require_numbers(outcome.T_target_source, (4, 4), subject, finite=False)).all():
                 raise FailedRegistration("the pose is not finite")
         except FailedRegistration as failure:
             return Outcome(np.array(pair.T_target_source_init, np.float64), 0.0, 0.0, str(failure))

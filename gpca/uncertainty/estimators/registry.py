@@ -9,6 +9,7 @@ from typing import cast
 import numpy as np
 
 from gpca.errors import InputError
+from gpca.io.arrays import require_numbers
 from gpca.process.registry import Registry
 from gpca.settings import require_arguments
 from gpca.uncertainty.estimators.interface import (
@@ -59,7 +60,8 @@ def make_estimator(
         if registered.outcome.fitness == 0:
             return CovarianceEstimate(None, registered.outcome.failure or "no source point is near the target")
         try:
-            covariance_6_6 = estimate(registered)
+            subject = f"estimator '{name}': its covariance"
+            covariance_6_6 = require_numbers(estimate(registered), (6, 6), subject, finite=False)
             if not np.isfinite(covariance_6_6).all():
                 raise FailedEstimate("the covariance is not finite")
         except FailedEstimate as failure:
