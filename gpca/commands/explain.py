@@ -21,13 +21,13 @@ from gpca.objects.surface import METERS_PER_UNIT
 
 if TYPE_CHECKING:
     from gpca.model.explainer import Explainer
-    from gpca.model.explanation import Explanation, ScanExplanation
+    from gpca.model.explanation import ExplainedRegistration, Explanation
 
-FAULTY_STATUS, UNKNOWN_STATUS = 2, 3  # exit codes; 1 is a failed check
+FAULTY_STATUS = 2  # exit code; 1 is a failed check
 FORMATS = "PLY, PCD, OBJ, STL, OFF, VTK, glb, npy, npz, xyz, txt, asc, pts, csv, bin of KITTI or nuScenes, LAS, E57"
 FIGURE = "gpca.model.explanation_figure"  # by name: only this needs matplotlib
-OBJECT_OPTIONS = ("model", "fast", "queue", "png")  # they need a model of objects
-FOR_ONE = ("init", "pose", "save_pose", "html", "png")  # options that do not go with many pairs
+OBJECT_OPTIONS = ("model", "fast", "queue", "png", "repair")  # they need a model of objects
+OF_ONE = ("html", "png", "save_pose", "out")  # outputs of one registration
 
 
 class _InsteadOfClouds(Action):
@@ -40,26 +40,34 @@ class _InsteadOfClouds(Action):
 
 
 def add_explain_arguments(parser: ArgumentParser) -> None:
+    add_registration_arguments(parser, "judged as it is: nothing is registered")
+    add = parser.add_argument
+    add("--repair", action="store_true", help="put a wrong result right, as 'gpca repair' does")
+    add("--save-pose", type=Path, metavar="FILE", help="write the pose that fits best, to start from with --init")
+    add("--uncertainty", action="store_true", help="measure how much the pose varies over other ICP starts")
+    add("--estimator", help="measure this by an estimator such as brossard (default: Monte-Carlo)")
+    fast = "re-enact fewer points and poses, without a guarantee, in nine tenths of the time or less"
+    add("--fast", action="store_true", help=fast)
+    add("--png", type=Path, metavar="FILE", help="write a figure of the results")
+    add("--queue", type=Path, metavar="FILE", help="add the registration, if queued, to a file for 'gpca label'")
+    parser.set_defaults(out=None, repairs_alone=False)
+
+
+def add_registration_arguments(parser: ArgumentParser, given_pose: str) -> None:
+    """Declare the clouds and what both commands ask of them; `given_pose` says what is done with a pose."""
     add = parser.add_argument
     add("source", type=Path, nargs="+", help=f"observed cloud or mesh ({FORMATS})")
     add("target", type=Path, help="reference to which each source is aligned")
     pairs = "CSV with the columns source, target and perhaps init, unit and source_unit, in place of both"
     add("--pairs", type=Path, metavar="FILE", action=_InsteadOfClouds, help=pairs)
     add("--init", type=Path, help="file with the initial pose T_target_source: 4×4, 3×4 or TUM, text or npy")
-    add("--pose", type=Path, help="such a file with a pose that is judged as it is: nothing is registered")
-    add("--save-pose", type=Path, metavar="FILE", help="write the pose that fits best, to start from with --init")
+    add("--pose", type=Path, help=f"such a file with a pose that is {given_pose}")
     add("--tolerance", help="how far the pose may be off: 5mm, 2deg or a share of the diameter (default 3%%)")
     add("--unit", choices=METERS_PER_UNIT, default="m", help="unit of files, pose and results (default m)")
     add("--source-unit", choices=METERS_PER_UNIT, help="unit of the sources, if another one")
     add("--model", type=Path, help="model file (default: GPCA_MODEL, one in ./results/, or the package's)")
     add("--method", help="registration method, such as gicp (default: the model's ICP)")
-    add("--uncertainty", action="store_true", help="measure how much the pose varies over other ICP starts")
-    add("--estimator", help="measure this by an estimator such as brossard (default: Monte-Carlo)")
-    fast = "re-enact fewer points and poses, without a guarantee, in nine tenths of the time or less"
-    add("--fast", action="store_true", help=fast)
     add("--html", type=Path, metavar="FILE", help="write a page with all results and 3-D views")
-    add("--png", type=Path, metavar="FILE", help="write a figure of the results")
-    add("--queue", type=Path, metavar="FILE", help="add the registration, if queued, to a file for 'gpca label'")
     add("--scans", action="store_true", help="both clouds are partial scans of any size")
     add("--voxel", type=length, help="edge length of voxels for scans (default: from the point spacing)")
     form = parser.add_mutually_exclusive_group()
@@ -71,8 +79,7 @@ def run_explain(options: Namespace) -> int:
     """Read all files, then explain and print one source after the other; everything but results goes to stderr.
 
     Files, except for those of a CSV, are read before heavy libraries are loaded, so that most mistakes are reported at
-    once. Returns 2 if a row of the CSV has a fault, else `UNKNOWN_STATUS` if one of the explanations means nothing,
-    otherwise 0.
+    once. Returns 2 if a row of the CSV has a fault, else the largest status of an explanation.
     """
     _require_options(options)
     path = None if options.scans else model_path(options.model)
@@ -80,7 +87,7 @@ def run_explain(options: Namespace) -> int:
         require_model(path)
     rows = from_rows(options) if options.pairs else []
     row_files = [options.pairs.parent / name for _, row in rows for key in FILES if (name := row.get(key))]
-    require_apart(options, ["html", "png", "queue", "save_pose"], [*filter(None, [path]), *row_files])
+    require_apart(options, [*OF_ONE, "queue"], [*filter(None, [path]), *row_files])
     inputs = [] if options.pairs else from_words(options)
     for each in inputs:
         each.require_formats()
@@ -100,7 +107,7 @@ def run_explain(options: Namespace) -> int:
     say_when_compiling()
     from gpca.model.explanation import LEARNED, Explanation
 
-    explain: Callable[..., Explanation | ScanExplanation]
+    explain: Callable[..., ExplainedRegistration]
     learned, names, extra = LEARNED, dict[str, str](), dict[str, str]()
     if path is None:
         from gpca.model.clouds import read_pose
@@ -125,15 +132,17 @@ def run_explain(options: Namespace) -> int:
         explainer, learned = Explainer(model), f"model {path}: {model.learning}"
         names["model"] = str(path)
         extra["trained_on"] = f"{model.title} (procedural stand-in)" if model.stand_in else model.title
-        explain = partial(
-            explainer.explain,
-            uncertainty=UncertaintySettings() if options.uncertainty or options.estimator else None,
-            estimator=options.estimator or MONTE_CARLO,
-            method=options.method,
-            fast=options.fast,
-            register=options.pose is None,
-            tolerance=tolerance,
-        )
+        common = {"method": options.method, "register": options.pose is None, "tolerance": tolerance}
+        explain = partial(explainer.repair, **common)
+        if not options.repairs_alone:
+            explain = partial(
+                explainer.explain,
+                uncertainty=UncertaintySettings() if options.uncertainty or options.estimator else None,
+                estimator=options.estimator or MONTE_CARLO,
+                fast=options.fast,
+                repair=options.repair,
+                **common,
+            )
     statuses = {0}
 
     def explain_one(each: Inputs, arguments: dict[str, Any]) -> None:
@@ -142,8 +151,8 @@ def run_explain(options: Namespace) -> int:
         except InputError as fault:
             raise InputError(each.source, str(fault)) from fault
         _write(options, explanation, {"source": str(each.source), "target": str(each.target), **names}, extra)
+        statuses.add(explanation.status)
         if isinstance(explanation, Explanation):
-            statuses.add(UNKNOWN_STATUS if explanation.unknown else 0)
             _queue(options.queue, explainer, explanation, f"{each.source} to {each.target}")
 
     for each, arguments in given:
@@ -153,7 +162,7 @@ def run_explain(options: Namespace) -> int:
             each = inputs_in(row, options)
             explain_one(each, each.read(read_target))
         except InputError as fault:  # the other rows are explained
-            print(f"gpca explain: {place}: {fault}", file=sys.stderr)
+            print(f"gpca {options.command}: {place}: {fault}", file=sys.stderr)
             statuses.add(FAULTY_STATUS)
     print(learned, file=sys.stderr)
     return FAULTY_STATUS if FAULTY_STATUS in statuses else max(statuses)
@@ -165,7 +174,7 @@ def _with_progress(rows: list[tuple[str, dict[str, str]]]) -> Iterable[tuple[str
         return ()
     from gpca.process.progress import progress
 
-    return progress(rows, "explaining", unit=" pairs")
+    return progress(rows, "pairs", unit=" pairs")
 
 
 def _length(text: str, unit: str) -> float:
@@ -185,19 +194,19 @@ def _require_options(options: Namespace) -> None:
             fault = "has sources and targets of its own" if options.source else "prints one line for each pair"
             raise InputError("--pairs", fault, "leave out the others" if options.source else "add --json-lines")
         options.source = []
-        for name in FOR_ONE:
+        for name in ("init", "pose", *OF_ONE):
             if getattr(options, name):
                 raise InputError(f"--{name.replace('_', '-')}", "is not for --pairs", "leave it out")
     if len(options.source) > 1 and not options.json_lines:
-        raise InputError("explain", f"{len(options.source)} sources need one line each", "add --json-lines")
+        raise InputError(options.command, f"{len(options.source)} sources need one line each", "add --json-lines")
     for name in OBJECT_OPTIONS if options.scans else ("voxel",):
         if (given := getattr(options, name)) is not None and given is not False:
             fault = "is not for scans" if options.scans else "is for scans alone"
             raise InputError(f"--{name}", fault, "leave it out" if options.scans else "add --scans")
-    for name in ("html", "png", "save_pose"):
+    for name in OF_ONE:
         if getattr(options, name) and len(options.source) > 1:
             fault = f"--{name.replace('_', '-')}"
-            raise InputError(fault, "is for one source", "explain one source after the other")
+            raise InputError(fault, "is for one source", f"{options.command} one source after the other")
     for name in ("init", "method"):
         if options.pose and getattr(options, name):
             raise InputError("--pose", f"is judged as it is, without --{name}", "leave one of them out")
@@ -206,7 +215,7 @@ def _require_options(options: Namespace) -> None:
 
 
 def _write(
-    options: Namespace, explanation: Explanation | ScanExplanation, names: dict[str, str], extra: dict[str, str]
+    options: Namespace, explanation: ExplainedRegistration, names: dict[str, str], extra: dict[str, str]
 ) -> None:
     """Print an explanation, in JSON with names and extra fields, and write its page and figure."""
     as_json = options.json or options.json_lines
@@ -221,6 +230,11 @@ def _write(
     if options.save_pose:
         explanation.save_pose(options.save_pose)
         print(f"pose {options.save_pose}", file=sys.stderr)
+    if options.out and explanation.status:
+        print(f"no pose in {options.out}: none is settled", file=sys.stderr)
+    elif options.out:
+        explanation.save_pose(options.out)
+        print(f"pose {options.out}", file=sys.stderr)
     if options.html:
         explanation.save_html(options.html, names)
         print(f"page {options.html}", file=sys.stderr)

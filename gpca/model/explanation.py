@@ -15,12 +15,13 @@ from gpca.alignment.pose_error import displacements
 from gpca.causes.truth import FAILED, NOMINAL
 from gpca.io.files import whole_file, write_text
 from gpca.model import page
-from gpca.model.diagnosis import ADVICE, CHECK, UNKNOWN, Diagnosis, FittingPose, Reenacted, plain
+from gpca.model.diagnosis import ADVICE, CHECK, TAKE, UNKNOWN, Diagnosis, FittingPose, Reenacted, plain
 from gpca.model.scene import Scene
 from gpca.numerals import in_decimals
 from gpca.rigid import as_rows, log
 
 NOT_SURE = "not sure"
+UNKNOWN_STATUS = 3  # exit code of the command if an explanation means nothing; 1 is a failed check, 2 a bad input
 GIVEN = "given"  # method of a pose that was not registered but judged
 LEARNED = (
     "the probability of a failure was fitted to scans of development scenes (docs/scans.md); the model, which learned "
@@ -86,6 +87,7 @@ class ExplainedRegistration:
 
     html: ClassVar[Callable[..., str]]
     lines: ClassVar[Callable[..., list[str]]]  # what was found, as text
+    text: ClassVar[Callable[..., str]]  # the same, as a report for a reader
 
     T_target_source: np.ndarray  # (4, 4) the resulting pose, in the unit of the points
     fitness: float
@@ -101,6 +103,11 @@ class ExplainedRegistration:
     gpca_warnings: tuple[str, ...] = ()  # reasons to doubt GP-CA as in the paper, which is shown beside it
     learned_from: str = ""  # training data
     scene: Scene | None = field(default=None, repr=False, compare=False)  # data of the 3-D view
+
+    @property
+    def status(self) -> int:
+        """The exit code of the command."""
+        return 0
 
     @property
     def advice(self) -> str:
@@ -149,7 +156,8 @@ class ExplainedRegistration:
         warnings = [f"warning   {line}" for line in self.warnings]
         pose = ["", f"T_target_source, in {self.unit}", *self.pose_rows(self.T_target_source)]
         if self.fitting_pose is not self.T_target_source:
-            pose += ["", "pose 1 as T_target_source, which --save-pose writes", *self.pose_rows(self.fitting_pose)]
+            name = "the repaired pose" if self.action == TAKE else "pose 1"
+            pose += ["", f"{name} as T_target_source, which --save-pose writes", *self.pose_rows(self.fitting_pose)]
         if self.moved:
             distance = page.length(self.moved.distance, self.unit)
             registration += f"\nmoved          {self.moved.rotation_deg:.3g}° and {distance} from the initial pose"
@@ -185,9 +193,20 @@ class Explanation(ExplainedRegistration):
         return () if self.diagnosis is None or self.unknown else self.diagnosis.reenacted.poses
 
     @property
+    def fitting_pose(self) -> np.ndarray:
+        """T_target_source (4, 4) of the repaired pose; without one, as for any registration."""
+        repaired = self.repaired is not None and self.repaired.action == TAKE
+        return self.repaired.T_target_source if self.repaired and repaired else super().fitting_pose
+
+    @property
     def unknown(self) -> bool:
         """Whether neither diagnosis nor scores mean anything for this pair."""
         return self.action == CHECK
+
+    @property
+    def status(self) -> int:
+        """The exit code of the command."""
+        return UNKNOWN_STATUS if self.unknown else 0
 
     def as_dict(self) -> dict[str, object]:
         """Values for JSON."""

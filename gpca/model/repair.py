@@ -135,8 +135,8 @@ def measured(observed: np.ndarray, model: np.ndarray, icp: ICPSettings, moved: M
 def search(pair: ObservedPair, settings: ReenactmentSettings, surface: ModelSurface) -> tuple[np.ndarray, np.ndarray]:
     """Return the hypotheses (K, 4, 4) of a pair's true pose, as a re-enactment has them, and their weights."""
     before, T_runs_n = transform(pair.T_init, pair.observed), pair.T_runs @ inverse(pair.T_init)
-    found = find_hypotheses(before, surface, T_runs_n, settings, generator(*pair.axes, "hypotheses"))
-    return np.array([hypothesis.T for hypothesis in found]), weights_of(found)
+    hypotheses = find_hypotheses(before, surface, T_runs_n, settings, generator(*pair.axes, "hypotheses"))
+    return np.array([hypothesis.T for hypothesis in hypotheses]), weights_of(hypotheses)
 
 
 def decide(judge: ResultJudge, level: Calibrated, proposals: Proposals, tolerance: float) -> Verdict:

@@ -1,4 +1,4 @@
-"""A registration that was put right, or why it was not, as a user is told."""
+"""A registration that was put right, or why it was not, in words and numbers for a user."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from gpca.causes.settings import OBSERVED
 from gpca.model import page
 from gpca.model.clouds import Clouds, voids_of
 from gpca.model.diagnosis import CHECK, TAKE, UNKNOWN, FittingPose
-from gpca.model.explanation import GIVEN, ExplainedRegistration
+from gpca.model.explanation import GIVEN, UNKNOWN_STATUS, ExplainedRegistration
 from gpca.model.file import Model
 from gpca.model.repair import (
     GOOD,
@@ -43,7 +43,7 @@ from gpca.reenactment.surface import ModelSurface
 from gpca.rigid import transform
 from gpca.seeds import seed_of
 
-STATUSES = {GOOD: 0, REPAIRED: 0, UNKNOWN: 3, NOT_REPAIRED: 4, SEVERAL: 5}  # exit codes of the command
+STATUSES = {GOOD: 0, REPAIRED: 0, UNKNOWN: UNKNOWN_STATUS, NOT_REPAIRED: 4, SEVERAL: 5}  # exit codes of the command
 ACTIONS = {GOOD: NOTHING, REPAIRED: TAKE}  # for the others, `CHECK`
 TONES = {GOOD: "good", REPAIRED: "good", NOT_REPAIRED: "bad"}  # CSS classes; for the others, "doubt"
 ALONG = 0.95  # cosine of the angle to an axis within which that axis names a direction
@@ -137,19 +137,23 @@ class Repair(ExplainedRegistration):
             refine = by_method(clouds.target, surface, method, seed_of("repair", method))
         measure = measured(before, pair.model, diagnoser.runs.icp, OBSERVED)
         hypotheses = search(pair, diagnoser.reenactment, surface)
-        found = propose(clouds.source, surface, T, *hypotheses, refine, measure)
-        found.evidence.fitness_N[0], found.evidence.inlier_rmse_N[0] = pair.fitness_n[0], pair.inlier_rmse_n[0]
+        proposals = propose(clouds.source, surface, T, *hypotheses, refine, measure)
+        proposals.evidence.fitness_N[0], proposals.evidence.inlier_rmse_N[0] = pair.fitness_n[0], pair.inlier_rmse_n[0]
         level = calibrated_at(diagnoser.levels, tolerance)
-        verdict = decide(diagnoser.judge, level, found, tolerance)
-        errors_n = diagnoser.judge.error(found.evidence)
-        poses = [pose.outside(frame, T_init) for pose in other_poses(found, verdict, errors_n, surface)]
+        verdict = decide(diagnoser.judge, level, proposals, tolerance)
+        errors_n = diagnoser.judge.error(proposals.evidence)
+        poses = [pose.outside(frame, T_init) for pose in other_poses(proposals, verdict, errors_n, surface)]
         best = verdict.row or 1
-        outliers, missing = unseen(clouds.source, surface, found.T_n[best])
+        outliers, missing = unseen(clouds.source, surface, proposals.T_n[best])
         probability_n = verdict.probability_n.tolist()
         T_new = poses[best - 1].T_target_source if verdict.row else T_registered
         if verdict.rows:
             poses = [poses[row - 1] for row in verdict.rows]
-        T_repaired = found.T_n[verdict.row] if verdict.row else None
+        T_repaired = None
+        if verdict.row:
+            T_repaired = proposals.T_n[verdict.row]
+            _, (fitness,), (rmse,) = clouds.icp.register(clouds.source, T_repaired[None], max_iterations=0)
+            unrepaired = replace(unrepaired, fitness=float(fitness), inlier_rmse=float(rmse) * frame.diameter)
         return replace(
             unrepaired,
             T_target_source=T_new,
@@ -164,7 +168,7 @@ class Repair(ExplainedRegistration):
             outliers=outliers,
             missing=missing,
             poses=tuple(poses),
-            scene=replace(scene, T_repaired=T_repaired, T_others=tuple(found.T_n[list(verdict.rows)])),
+            scene=replace(scene, T_repaired=T_repaired, T_others=tuple(proposals.T_n[list(verdict.rows)])),
         )
 
     @property
@@ -203,7 +207,7 @@ class Repair(ExplainedRegistration):
         """Return a page that needs no other file, with the registered pose and the repaired one side by side."""
         head = f'<h1 class="{TONES.get(self.verdict, "doubt")}">{page.sentence(self.verdict)}</h1>'
         inputs = {"training": self.learned_from} | dict(names or {})
-        head += f"<p>{page.sentence(self.reason)}.</p>{page.warnings(self.warnings)}"
+        head += page.warnings(self.warnings)
         details = page.details(self.as_dict(), inputs, self.pose_rows(self.T_target_source))
         body = [page.listed("Repair", self.lines()), details]
         return page.assembled("Registration repaired", head, body, self.scene, self.unit)
@@ -223,14 +227,14 @@ class Repair(ExplainedRegistration):
         return f"{outliers}; {self.missing.share:.0%} of the target were not seen, on {side}"
 
 
-def other_poses(found: Proposals, verdict: Verdict, error_n: np.ndarray, surface: ModelSurface) -> list[OtherPose]:
+def other_poses(proposals: Proposals, verdict: Verdict, error_n: np.ndarray, surface: ModelSurface) -> list[OtherPose]:
     """Describe the proposals for the place of the registered pose, in diameters."""
     poses, first = [], verdict.rows[0] if verdict.rows else 1
-    for row in range(1, len(found.T_n)):
-        T, off = found.T_n[row], float(verdict.probability_n[row])
-        differs, by = (None, 0.0) if row == first else difference(surface, found.T_n[first], T)
-        numbers = float(found.weight_n[row]), float(error_n[row])
-        poses.append(OtherPose.of(T, *numbers, found.T_n[0], surface, off=off, differs=differs, differs_by=by))
+    for row in range(1, len(proposals.T_n)):
+        T, off = proposals.T_n[row], float(verdict.probability_n[row])
+        differs, by = (None, 0.0) if row == first else difference(surface, proposals.T_n[first], T)
+        numbers = float(proposals.weight_n[row]), float(error_n[row])
+        poses.append(OtherPose.of(T, *numbers, proposals.T_n[0], surface, off=off, differs=differs, differs_by=by))
     return poses
 
 

@@ -1,0 +1,31 @@
+"""Command ``repair``: puts a user's wrong registrations right, on stdout."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from gpca.commands.explain import add_registration_arguments, run_explain
+from gpca.errors import InputError
+
+# What `explain` alone can do.
+LEFT_OUT = dict.fromkeys(("save_pose", "estimator", "png", "queue")) | {"uncertainty": False, "fast": False}
+
+
+def add_repair_arguments(parser: ArgumentParser) -> None:
+    add_registration_arguments(parser, "put right as it is: nothing is registered first")
+    out = "write the pose that is good or repaired; where none is, nothing is written"
+    parser.add_argument("--out", type=Path, metavar="FILE", help=out)
+    parser.set_defaults(**LEFT_OUT, repair=False, repairs_alone=True)
+
+
+def run_repair(options: Namespace) -> int:
+    """Put right and print one registration after the other, as `explain` explains them.
+
+    Returns 0 if each is good or repaired, otherwise the largest status of `gpca.model.repaired.STATUSES`, or 2 if a row
+    of the CSV has a fault.
+    """
+    if options.scans:
+        remedy = "run 'gpca explain --scans --save-pose FILE', whose pose fits best, and judge it with --pose"
+        raise InputError("--scans", "is not for repair, which needs a whole target", remedy)
+    return run_explain(options)
