@@ -19,8 +19,8 @@ from gpca.declarations.result import Frame, Paths, numbers, table
 from gpca.declarations.step import Plan, Step
 from gpca.errors import InputError, require_names, with_key
 from gpca.evaluation import measures as evaluated
-from gpca.evaluation.intervals import Clustered
-from gpca.evaluation.measures import ALL, Measure
+from gpca.evaluation.intervals import Clustered, weighted_mean
+from gpca.evaluation.measures import ALL, SHARE, Measure
 from gpca.io.csv_file import numbers as number_column
 from gpca.io.csv_file import read_csv
 from gpca.objects.canonical import ObjectClouds
@@ -32,6 +32,7 @@ from gpca.steps.registration_trials import INITIAL, NO_START, SEVERITY_COLUMNS, 
 
 NAME = "registration_methods"
 TRIAL_COLUMNS = ("add_relative", "rotation_error_rad", "translation_error", "points", *SEVERITY_COLUMNS)
+RIVAL = "rival"  # the best other method at the same start, in the column `against`
 BINS = ("low", "middle", "high")  # thirds of the drawn severities
 # The severities of a concept: column, range in the config, factor from that to the column's unit.
 DRAWN = {
@@ -183,7 +184,28 @@ def collect(run: Run, files: Paths, objects: Paths) -> tuple[Frame, Frame]:
     by_cause |= {name: replace(measured[name], only=(ALL,)) for name in order}
     draws = Clustered.drawn(rows["seed"], rows["cluster"], "registration intervals")
     masks, pooled = partial(parts, severities=severities), rows.assign(source=evaluated.POOLED)
-    return evaluated.per_seed(rows, masks, measured), evaluated.over_seeds(pooled, masks, by_cause, draws)
+    intervals = evaluated.over_seeds(pooled, masks, by_cause, draws)
+    return evaluated.per_seed(rows, masks, measured), with_leads(intervals, rows, measured["success"])
+
+
+def with_leads(intervals: Frame, rows: Frame, success: Measure) -> Frame:
+    """Intervals, and by how much each method succeeds more often than the best other one at its start, by cause."""
+    import pandas as pd
+
+    records: list[tuple] = []
+    pair = ["source", "seed", "sample"]
+    for _, trials in rows.assign(right=success.of).groupby("start", sort=False):
+        wide = trials.pivot(index=pair, columns="method", values="right").dropna()  # pairs that all have registered
+        same = trials.drop_duplicates(pair).set_index(pair, drop=False).loc[wide.index]
+        draws = Clustered.drawn(same["seed"], same["cluster"], "registration intervals")
+        for part, mask_N in evaluated.by_value(same, "concept", CONCEPTS).items():
+            drawn = draws.subset(mask_N)
+            values = {name: weighted_mean(wide[name][mask_N].to_numpy(float), drawn.weights) for name in wide}
+            records += evaluated.compared(
+                (NAME, evaluated.POOLED), "success", part, values, drawn, SHARE, {RIVAL: lambda _, names: names}
+            )
+    frame = evaluated.tidy(records, "registrations", (*evaluated.KEYS, *evaluated.AGAINST, *evaluated.NUMBERS))
+    return pd.concat([intervals.assign(against="", other=""), frame[frame["against"] != ""]])[list(frame.columns)]
 
 
 def read_seconds(files: Paths) -> Frame:
@@ -210,6 +232,7 @@ ERRORS = {
     "rotation_deg": show("rotation_deg", "Rotation (°)", factor=1, limits=(0, 180), least_is_best=True),
     "translation": show("translation", "Translation (% d)", limits=(0, inf), least_is_best=True),
 }
+LEAD: dict[str, Any] = {"where": {"against": RIVAL}, "limits": (-100.0, 100.0)}
 NO_INTERVAL: dict[str, Any] = {"interval": False, "limits": (0, inf)}
 COSTS = {
     "points": show("points", "Points", factor=1, frame="metrics", decimals=0, **NO_INTERVAL),
@@ -229,9 +252,10 @@ COSTS = {
 )
 def table11_registration(run: Run, intervals, metrics, seconds):
     by_seed = {"metrics": metrics, "seconds": seconds}
-    columns = CAUSES | ERRORS | COSTS
+    columns = CAUSES | {"lead": show("success", "Lead (points)", **LEAD)} | ERRORS | COSTS
     sheet = Sheet("table11_registration", HEADS, rows_of(run), columns, intervals, by_seed, list(run.sources))
     note = (
+        "Lead: how many more succeed than by the best other method of the same start, pair by pair. "
         "Errors are means over all registrations, at the last pose of those that failed; rotations up to the object's "
         "symmetries. Failed: given up by the method itself, or not at rest. Points: of a cloud, on average over "
         "sources and targets; behind a global start, the local method's. ms: of one registration, with its global "
@@ -271,11 +295,15 @@ def table11_severity(run: Run, intervals):
         for cause in CONCEPTS
         for name in BINS
     }
-    sheet = Sheet("table11_severity", HEADS, rows_of(run), columns, intervals)
+    leads = {
+        f"lead_{cause}": show("success", f"{cause.capitalize()}, lead (points)", cause, decimals=0, **LEAD)
+        for cause in CONCEPTS
+    }
+    sheet = Sheet("table11_severity", HEADS, rows_of(run), columns | leads, intervals)
     pairs = {key: cell.test_samples for (_, key), cell in sheet.cells.items()}
     note = (
         "Low, middle, high: thirds of what is drawn; a pose error counts by the mean of its places in the two ranges. "
-        f"Pairs of all seeds, by column: {', '.join(str(pairs.get(key, 0)) for key in columns)}."
+        f"Lead: as in Table XI. Pairs of all seeds, by column: {', '.join(str(pairs.get(key, 0)) for key in columns)}."
     )
     caption = "Registrations that succeed, by cause and severity (%)" + run.stand_ins()
     return sheet.table(caption, "cause", [*notes(run, sheet, intervals), note], bold=columns, same=1, keep_empty=True)

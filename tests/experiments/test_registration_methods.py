@@ -118,6 +118,20 @@ def test_every_start_cause_and_bin_has_its_metrics(written, object_files):
     assert not metrics["concept"].str.endswith("middle").any()  # no pair is of middle severity
 
 
+def test_a_lead_is_paired_and_over_the_best_other_method_of_the_same_start(written, object_files):
+    gicp = two_starts()
+    worse = gicp.assign(add_relative=np.where(gicp["sample"] == 1, 0.3, gicp["add_relative"]))
+    worst = gicp.assign(add_relative=0.3)
+    trials = {"gicp": gicp, "huber": worse[worse["sample"] < 5], "tukey": worst}  # one pair was not registered by all
+    files = [written(rows, method, seed) for seed in (0, 1) for method, rows in trials.items()]
+    leads = collect(of_run(), files, object_files)[1].query("against == 'rival'").set_index(["method", "concept"])
+    assert set(leads["source"]) == {"pooled"} and set(leads.loc[["gicp"], "samples"]) == {10, 4, 2}
+    ahead = leads.loc["gicp", "all"]
+    assert (ahead["other"], ahead["value"]) == ("huber", pytest.approx(1 / 5))
+    assert leads.loc["huber", "all"]["value"] == pytest.approx(-1 / 5)
+    assert leads.loc["fgr+gicp", "all"]["other"].startswith("fgr+")
+
+
 def test_a_global_method_has_one_row_of_its_name(written, object_files):
     metrics, _ = collect(of_run(), [written(two_starts(("none",)), "fgr")], object_files)
     assert set(metrics["method"]) == {"fgr"}
@@ -163,7 +177,9 @@ def test_the_file_is_read_as_it_was_written(written):
 def test_intervals_are_of_the_same_measures_over_all_pairs(files, object_files, tmp_path):
     metrics, found = collect(of_run(success={"error": 0.03, "curve": [0.03, 0.5]}), files, object_files)
     write_csv(tmp_path / "intervals.csv", found, form=None)
-    found = read_clustered(tmp_path / "intervals.csv").set_index(["method", "metric", "concept"])
+    found = read_clustered(tmp_path / "intervals.csv")
+    assert (found["against"] == "").all()  # there is no other method
+    found = found.set_index(["method", "metric", "concept"])
     metrics = metrics.set_index(["method", "metric", "concept"])["value"]
     counts = ("test_samples", "points")
     every = {key for key in metrics.index if key[1] not in counts and (key[1] == "success" or key[2] == "all")}
