@@ -8,25 +8,56 @@ the likeliest of many ends is the result (:mod:`gpca.reenactment.hypotheses`).
 from __future__ import annotations
 
 from functools import partial
+from typing import Annotated
 
 import numpy as np
+from scipy.spatial import cKDTree
 
+from gpca.alignment.batched_icp import BatchedICP
+from gpca.alignment.icp import ICPSettings
 from gpca.alignment.methods.interface import (
     CORRESPONDENCE_DISTANCE,
     FEWEST,
+    MAX_ITERATIONS,
     FailedRegistration,
     MethodEntry,
     Outcome,
     Pair,
 )
-from gpca.reenactment.hypotheses import find_hypotheses, log_prior, rotations, weights_of
+from gpca.alignment.methods.local import align_compiled
+from gpca.reenactment.hypotheses import (
+    LAST_ITERATIONS,
+    find_hypotheses,
+    first_of_alike,
+    log_prior,
+    rotations,
+    search_starts,
+    weights_of,
+)
+from gpca.reenactment.mixture import Mixture
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
 from gpca.rigid import inverse, rigid_motion, scale_translation, transform
 from gpca.seeds import generator
-from gpca.settings import Positive
+from gpca.settings import Bounds, Positive, PositiveShare
 
 TURNS = 96  # starts at turns of any size, where there is no initial pose
+
+
+class Frame:
+    """The frame of a search, at the center of the target and in `unit`: source, at its initial pose, and target."""
+
+    def __init__(self, pair: Pair, T_init: np.ndarray, unit: float) -> None:
+        T_frame_target = rigid_motion(np.eye(3), -pair.target.mean(axis=0))
+        self._T_frame_source, self._T_target_frame, self._unit = T_frame_target @ T_init, inverse(T_frame_target), unit
+        self.source = transform(self._T_frame_source, pair.source) / unit
+        self.target = transform(T_frame_target, pair.target) / unit
+        if min(len(np.unique(points, axis=0)) for points in (self.source, self.target)) < FEWEST:
+            raise FailedRegistration(f"fewer than {FEWEST} different points")
+
+    def pose(self, T: np.ndarray) -> np.ndarray:
+        """Return the pose T_target_source (4×4) of a motion of the source in this frame."""
+        return self._T_target_frame @ scale_translation(T, self._unit) @ self._T_frame_source
 
 
 def pose_posterior(
@@ -37,17 +68,9 @@ def pose_posterior(
     With a prior, the initial pose is believed in as the settings say; without, it is not read. The search takes `unit`
     for the diameter of the target.
     """
-    T_frame_target = np.eye(4)
-    T_frame_target[:3, 3] = -pair.target.mean(axis=0)
-    T_init = pair.T_target_source_init if prior else _onto_center(pair)
-    T_frame_source = T_frame_target @ T_init
-    before, target = (
-        transform(T, points) / unit for T, points in ((T_frame_source, pair.source), (T_frame_target, pair.target))
-    )
-    if min(len(np.unique(points, axis=0)) for points in (before, target)) < FEWEST:
-        raise FailedRegistration(f"fewer than {FEWEST} different points")
+    frame = Frame(pair, pair.T_target_source_init if prior else _onto_center(pair), unit)
     random = generator("registration", "posterior", pair.seed)
-    given = (before, ModelSurface(target))
+    given = (frame.source, ModelSurface(frame.target))
     if prior:
         hypotheses = find_hypotheses(*given, np.empty((0, 4, 4)), settings, random)
     else:
@@ -56,15 +79,11 @@ def pose_posterior(
         hypotheses = find_hypotheses(
             *given, about_center_n, settings, random, lambda T, _width: -log_prior(T, settings)
         )
-    back = inverse(T_frame_target)
-    poses = [back @ scale_translation(hypothesis.T, unit) @ T_frame_source for hypothesis in hypotheses]
-    return np.stack(poses), weights_of(hypotheses)
+    return np.stack([frame.pose(hypothesis.T) for hypothesis in hypotheses]), weights_of(hypotheses)
 
 
 def _onto_center(pair: Pair) -> np.ndarray:
-    T = np.eye(4)
-    T[:3, 3] = pair.target.mean(axis=0) - pair.source.mean(axis=0)
-    return T
+    return rigid_motion(np.eye(3), pair.target.mean(axis=0) - pair.source.mean(axis=0))
 
 
 def align(
@@ -75,7 +94,42 @@ def align(
     return Outcome.at(pair, T, correspondence_distance)
 
 
+def align_from_many(
+    by_likelihood: bool,
+    pair: Pair,
+    wide_distance: Positive = 0.25,
+    correspondence_distance: float = CORRESPONDENCE_DISTANCE,
+    max_iterations: int = MAX_ITERATIONS,
+    overlap: PositiveShare = 0.7,
+    points: Annotated[int, Bounds(minimum=FEWEST)] = 512,
+    unit: Positive = 1.0,
+) -> Outcome:
+    """Run ICP from the starts of the search on `points` of the source, at first within `wide_distance`.
+
+    The result, at last on all points, is the end of the least mean square over the smallest distances, the share
+    `overlap` of all, or the likeliest under the mixture whose width and share of outliers are fitted at each end.
+    """
+    frame = Frame(pair, pair.T_target_source_init, unit)
+    kept = generator("registration", "many starts", pair.seed).permutation(len(frame.source))[:points]
+    few, ends_n = frame.source[np.sort(kept)], search_starts(frame.source, frame.target)
+    for distance in (wide_distance, correspondence_distance):
+        icp = BatchedICP(frame.target, ICPSettings("point_to_point", distance / unit, max_iterations))
+        ends_n = icp.register(few, ends_n)[0]
+        ends_n = ends_n[first_of_alike(ends_n)]
+    if by_likelihood:
+        mixture = Mixture(frame.target, ModelSurface(frame.target).spacing / 2)
+        fit_n = mixture.fit(few, ends_n, LAST_ITERATIONS, moving=False).log_likelihood_n
+    else:
+        tree, counted = cKDTree(frame.target), max(FEWEST, round(overlap * len(few)))
+        distance_n_N = np.sort([tree.query(transform(T, few))[0] for T in ends_n], axis=1)
+        fit_n = -np.square(distance_n_N[:, :counted]).mean(axis=1)
+    best = frame.pose(ends_n[np.argmax(fit_n)])
+    return align_compiled(pair.started_at(best), correspondence_distance, max_iterations)
+
+
 METHODS = {
     "posterior": MethodEntry("EM from many starts, initial pose as prior", partial(align, True)),
     "posterior_global": MethodEntry("EM from many starts", partial(align, False), is_global=True),
+    "multistart": MethodEntry("ICP from many starts, least trimmed cost", partial(align_from_many, False)),
+    "multistart_likelihood": MethodEntry("ICP from many starts, likeliest end", partial(align_from_many, True)),
 }

@@ -18,7 +18,7 @@ from tests.documents import ROOT
 
 from .pairs import POOR, clouds, error, perturbed, small_motion
 
-OPTIONAL = {"gicp_small": "small_gicp", "kiss_matcher": "kiss_matcher"}
+OPTIONAL = {"cpd": "pycpd", "gicp_small": "small_gicp", "kiss_matcher": "kiss_matcher"}
 RUNNING = sorted(set(registry.methods()) - set(registry.left_out(registry.methods())))
 LOCAL = [name for name in RUNNING if not registry.method_entry(name).is_global]
 GLOBAL = [name for name in RUNNING if registry.method_entry(name).is_global]
@@ -42,8 +42,9 @@ def test_a_local_method_aligns_what_lies_close(objects, name, seed):
     outcome = registry.make_method(name)(pair)
     assert outcome.failure == "" and outcome.fitness > 0.9
     require_rigid(outcome.T_target_source, name)
-    before, after = (pose_error(pair.source, T, T_true, False) for T in (np.eye(4), outcome.T_target_source))
-    assert after < 0.04 < before
+    half_turn = name in SEARCHING  # may be taken: the objects are symmetric
+    before, after = (pose_error(pair.source, T, T_true, half_turn) for T in (np.eye(4), outcome.T_target_source))
+    assert after < 0.04 and after < before
 
 
 @pytest.mark.parametrize("name", GLOBAL)
@@ -89,7 +90,7 @@ def test_without_normals_a_registration_fails(objects, name):
     assert np.array_equal(outcome.T_target_source, start)
 
 
-@pytest.mark.parametrize("name", sorted({*LOCAL} - {"trimmed"} - SEARCHING))  # which go any distance
+@pytest.mark.parametrize("name", sorted({*LOCAL} - {"cpd", "trimmed"} - SEARCHING))  # which go any distance
 def test_without_correspondences_a_registration_fails(objects, name):
     pair, _ = small_motion(objects)
     far = np.eye(4)
