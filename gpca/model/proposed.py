@@ -10,6 +10,7 @@ import numpy as np
 from gpca.alignment.icp import ICPSettings
 from gpca.causes.dataset import Causes
 from gpca.causes.descriptors import observed_pair
+from gpca.causes.measuring import Subject
 from gpca.causes.settings import Moved
 from gpca.causes.truth import capped
 from gpca.guarantee.acceptance import accepted_below
@@ -17,12 +18,14 @@ from gpca.io.arrays import TEXT
 from gpca.io.container import Container, array
 from gpca.model.repair import Proposals, by_mixture, measured, propose
 from gpca.model.result import Calibrated, Evidence, ResultJudge
+from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.distances import ObservedPair
+from gpca.reenactment.dataset import Reenactments
 from gpca.reenactment.surface import ModelSurface
 from gpca.rigid import inverse, transform
 
 FOLDS = 5  # of families, at most
-Errors = Callable[[int, np.ndarray], np.ndarray]  # row, poses T_target_source (n, 4, 4) -> errors (n,), diameters
+Errors = Callable[[int, np.ndarray], np.ndarray]  # row, poses T_target_source (n, 4, 4) -> capped errors, diameters
 
 
 @dataclass(frozen=True)
@@ -75,6 +78,21 @@ class Proposed(Container):
             yield from GroupKFold(count).split(self.family_N, groups=self.family_N)
 
 
+def pose_errors(causes: Causes, objects: ObjectClouds) -> Errors:
+    """Return what measures the errors of poses of these registrations: ADD, or ADD-S of symmetric objects."""
+    subjects: dict[tuple[int, bool], Subject] = {}
+
+    def errors(row: int, T_n: np.ndarray) -> np.ndarray:
+        registrations = causes.registrations
+        key = int(registrations.object_index[row]), bool(causes.symmetric[row])
+        if key not in subjects:
+            subjects[key] = Subject.of(objects, *key)
+        T_true = registrations.T_target_source("true", row)
+        return capped(subjects[key].errors(np.array([T_true @ inverse(T) for T in T_n])))
+
+    return errors
+
+
 def propose_for(
     pair: ObservedPair, T_K: np.ndarray, weight_K: np.ndarray, icp: ICPSettings, moved: Moved, surface: ModelSurface
 ) -> Proposals:
@@ -85,14 +103,14 @@ def propose_for(
 
 
 def proposed_for_all(
-    causes: Causes, T_N_K: np.ndarray, weight_N_K: np.ndarray, errors: Errors, icp: ICPSettings, moved: Moved
+    causes: Causes, reenactments: Reenactments, errors: Errors, icp: ICPSettings, moved: Moved
 ) -> Proposed:
-    """Return the proposals for every registration, by the hypotheses (N, K, 4, 4) of its re-enactment."""
+    """Return the proposals for every registration, by the hypotheses of its re-enactment."""
     proposals, error_N = [], []
-    for row, (T_K, weight_K) in enumerate(zip(T_N_K, weight_N_K, strict=True)):
+    for row, hypotheses in enumerate(zip(reenactments.T_model_observed, reenactments.weight, strict=True)):
         pair = observed_pair(causes, row)
-        proposals.append(propose_for(pair, T_K, weight_K, icp, moved, ModelSurface(pair.model)))
-        error_N.append(capped(errors(row, proposals[-1].T_n)))
+        proposals.append(propose_for(pair, *hypotheses, icp, moved, ModelSurface(pair.model)))
+        error_N.append(errors(row, proposals[-1].T_n))
     return joined(proposals, error_N, causes.registrations.cluster)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -123,21 +124,28 @@ def model(job: Job) -> None:
     from gpca.model.clouds import Familiarity
     from gpca.model.diagnoser import TrainingSet, learn
     from gpca.model.file import Model
+    from gpca.model.proposed import Proposed, pose_errors, proposed_for_all, with_repair
     from gpca.reenactment.dataset import Reenactments
 
-    inputs = [job.registrations, job.encoder, job.embeddings, *job.causes, *job.reenactments]
+    inputs = [job.registrations, job.encoder, job.embeddings, *job.objects, *job.causes, *job.reenactments]
     with record_provenance([job.out], inputs, job.settings, seed=job.seed):
-        loaded = [(Causes.load(path), enacted) for path, enacted in zip(job.causes, job.reenactments, strict=True)]
-        sets = [TrainingSet.of(each, Reenactments.load(enacted, each.registrations)) for each, enacted in loaded]
         icp, section = job.section("registrations").get("icp", {}), job.section("model")
+        truth, sets, proposals = CauseSettings.from_dict(job.section("causes") | section.get("causes", {}), icp), [], []
+        for objects_path, path, enacted in zip(job.objects, job.causes, job.reenactments, strict=True):
+            causes = Causes.load(path)
+            reenactments = Reenactments.load(enacted, causes.registrations)
+            sets.append(TrainingSet.of(causes, reenactments))
+            errors = pose_errors(causes, ObjectClouds.load(objects_path))
+            proposals.append(proposed_for_all(causes, reenactments, errors, truth.icp, truth.moved))
         diagnoser, bald_N = learn(
             TrainingSet.joined(sets),
             GPCSettings(**section.get("classifier", {})),
-            CauseSettings.from_dict(job.section("causes") | section.get("causes", {}), icp),
+            truth,
             ReenactmentSettings(**job.section("reenactment")),
             section.get("false_alarms", 0.05),
             *("model", job.seed),
         )
+        diagnoser = replace(diagnoser, levels=with_repair(diagnoser.levels, Proposed.joined(proposals)))
         settings, axes = EncoderSettings(**job.section("encoder")), (job.source, job.seed)
         recovery = job.section("recovery")
         registrations = Registrations.load(job.registrations, axes)

@@ -20,7 +20,6 @@ from gpca.alignment.methods.registry import make_method
 from gpca.alignment.pose_error import displacements
 from gpca.causes.dataset import Causes, labels_of
 from gpca.causes.descriptors import observed_pair
-from gpca.causes.measuring import Subject
 from gpca.causes.scans import OverlapErrors
 from gpca.causes.settings import OBSERVED, CauseSettings, Moved
 from gpca.causes.truth import capped
@@ -30,7 +29,7 @@ from gpca.io.container import Container, array
 from gpca.io.csv_file import ANY, numbers, read_csv, write_csv
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
-from gpca.model.proposed import Proposed, joined, propose_for
+from gpca.model.proposed import Errors, Proposed, joined, pose_errors, propose_for
 from gpca.model.repair import Proposals, measured, search
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.distances import ObservedPair
@@ -153,29 +152,19 @@ def attempt(job: Job) -> None:
 
 
 class World:
-    """What is known of registrations for judging poses of them."""
+    """What is known of registrations for judging poses of them; scans have no object."""
 
     def __init__(self, causes: Causes, about: Any, objects: ObjectClouds | None) -> None:
-        self.causes, self.about, self._objects = causes, about, objects
-        self._subjects: dict[tuple[int, bool], Subject] = {}
+        self.causes, self.about = causes, about
+        self.errors: Errors = pose_errors(causes, objects) if objects else self._overlap_errors
 
-    def errors(self, row: int, T_n: np.ndarray) -> np.ndarray:
-        """Return the errors (n,) of poses T_target_source (n, 4, 4), in diameters."""
+    def _overlap_errors(self, row: int, T_n: np.ndarray) -> np.ndarray:
         registrations = self.causes.registrations
         T_true = registrations.T_target_source("true", row)
-        off_n = np.array([T_true @ inverse(T) for T in T_n])
-        if self._objects is None:
-            return capped(self._overlap_errors(row, T_true)(off_n))
-        key = int(registrations.object_index[row]), bool(self.causes.symmetric[row])
-        if key not in self._subjects:
-            self._subjects[key] = Subject.of(self._objects, *key)
-        return capped(self._subjects[key].errors(off_n))
-
-    def _overlap_errors(self, row: int, T_true: np.ndarray) -> OverlapErrors:
-        registrations = self.causes.registrations
         points, target = transform(T_true, registrations.source(row)), registrations.target(row).astype(np.float64)
         common_N = near(points, target, REACH * ModelSurface(target).spacing)
-        return OverlapErrors(points[common_N] if common_N.any() else points, float(self.about["error_factor"][row]))
+        judged = OverlapErrors(points[common_N] if common_N.any() else points, float(self.about["error_factor"][row]))
+        return capped(judged(np.array([T_true @ inverse(T) for T in T_n])))
 
     @cached_property
     def columns(self) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -75,6 +75,8 @@ def learn_limits(learned: Attempts, tolerance: float) -> Limits:
     off_N = proposed.error_N_P[:, 0] > tolerance
     threshold = threshold_of(result_N[~off_N], FALSE_ALARMS)
     [level] = with_repair([Calibrated(tolerance, threshold)], proposed)
+    if level.repaired_below is None:  # nothing is
+        level = replace(level, repaired_below=0.0)
     called, tests = np.flatnonzero(result_N >= threshold), {}
     for m, name in enumerate(learned.method_M.tolist()):
         wrong_n = rivals.error_N_P[called, m] > tolerance

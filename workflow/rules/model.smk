@@ -62,6 +62,7 @@ rule model:
     input:
         **MODEL_INPUTS,
         encoder=f"<results>/encoders/{MODEL_SOURCE}/{MODEL_ENCODER}/seed{SEEDS[0]}.pt",
+        objects=collect("<results>/objects/{source}.npz", source=SOURCES),
         causes=collect(
             "<results>/model_causes/{source}/seed{seed}.npz",
             source=SOURCES,
