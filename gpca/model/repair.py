@@ -96,6 +96,11 @@ def propose(
     return Proposals(T_n, np.append(0.0, weight_n), evidence)
 
 
+def unrefined(observed: np.ndarray, T_k: np.ndarray) -> np.ndarray:
+    """Leave poses as the search found them, which the likelihood of all these points has refined already."""
+    return T_k
+
+
 def by_mixture(model: np.ndarray, spacing: float) -> Refine:
     """Return what refines poses to a model (M, 3) by the likelihood of the hypotheses, in which outliers hardly count.
 

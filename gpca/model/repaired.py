@@ -25,6 +25,7 @@ from gpca.model.repair import (
     WRONG,
     Part,
     Proposals,
+    Refine,
     Verdict,
     by_method,
     by_mixture,
@@ -33,6 +34,7 @@ from gpca.model.repair import (
     measured,
     propose,
     search,
+    unrefined,
     unseen,
 )
 from gpca.model.result import calibrated_at
@@ -93,7 +95,7 @@ class Repair(ExplainedRegistration):
     failed_from: float | None = None  # probability from which a registered pose is called failed,
     good_below: float | None = None  # and below which another takes its place
     wrong: float | None = None  # at most this share of poses that are called repaired is wrong; None: no promise
-    outliers: float | None = None  # share of the source that was left out at the likeliest pose
+    outliers: float | None = None  # share of the source at the likeliest pose; None of a good one, as the next
     missing: Part | None = None  # the part of the target that was not seen there; None if nearly all was
     poses: tuple[OtherPose, ...] = ()  # that the search found, refined; if several fit, these alone
     seconds: float = 0.0  # duration
@@ -132,7 +134,10 @@ class Repair(ExplainedRegistration):
             return unrepaired
         pair = diagnoser.pair(clouds.source, clouds.target, T, method != GIVEN)
         surface, before = ModelSurface(pair.model), transform(pair.T_init, pair.observed)
-        refine = by_mixture(clouds.target, surface.spacing * np.sqrt(len(pair.model) / len(clouds.target)))
+        refine: Refine = unrefined
+        drawn = len(pair.observed) / len(clouds.source), len(pair.model) / len(clouds.target)
+        if min(drawn) < 1:
+            refine = by_mixture(clouds.target, surface.spacing * drawn[1] ** 0.5)
         if method not in (None, GIVEN) and not method_entry(method).is_global:
             refine = by_method(clouds.target, surface, method, seed_of("repair", method))
         measure = measured(before, pair.model, diagnoser.runs.icp, OBSERVED)
@@ -143,10 +148,11 @@ class Repair(ExplainedRegistration):
         verdict = decide(diagnoser.judge, level, proposals, tolerance)
         errors_n = diagnoser.judge.error(proposals.evidence)
         poses = [pose.outside(frame, T_init) for pose in other_poses(proposals, verdict, errors_n, surface)]
-        best = verdict.row or 1
-        outliers, missing = unseen(clouds.source, surface, proposals.T_n[best])
+        if verdict.name != GOOD:
+            outliers, missing = unseen(clouds.source, surface, proposals.T_n[verdict.row or 1])
+            unrepaired = replace(unrepaired, outliers=outliers, missing=missing)
         probability_n = verdict.probability_n.tolist()
-        T_new = poses[best - 1].T_target_source if verdict.row else T_registered
+        T_new = poses[verdict.row - 1].T_target_source if verdict.row else T_registered
         if verdict.rows:
             poses = [poses[row - 1] for row in verdict.rows]
         T_repaired = None
@@ -165,8 +171,6 @@ class Repair(ExplainedRegistration):
             failed_from=level.threshold,
             good_below=level.good_below,
             wrong=None if level.repaired_below is None else WRONG,
-            outliers=outliers,
-            missing=missing,
             poses=tuple(poses),
             scene=replace(scene, T_repaired=T_repaired, T_others=tuple(proposals.T_n[list(verdict.rows)])),
         )
