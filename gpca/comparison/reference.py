@@ -8,7 +8,7 @@ deviation √(d / n), which bounds the allowed difference (docs/comparison.md).
 from __future__ import annotations
 
 import math
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -21,6 +21,7 @@ from gpca.errors import InputError
 from gpca.evaluation.intervals import mean_interval
 from gpca.evaluation.measures import KEYS, TIDY_COLUMNS
 from gpca.io.csv_file import ANY, finite_number, read_csv
+from gpca.io.files import require_file
 from gpca.jobs.provenance import read_record
 from gpca.settings import Keys, NotNegative, Share
 
@@ -30,6 +31,8 @@ NOT_COMPARED = (  # made from times, which differ from run to run
     *("comparison.csv", "claims.csv", "tables/claims.csv"),
 )
 TIMES = "*seconds*"
+LARGEST_BYTES = 3 * 10**7  # of a file of means, ten times the largest
+REMEDY = "regenerate it"
 _COUNTS = "*labels* *epochs* *samples* *delay* *calls* *parameters* clusters predicted_as_* first_* *_wrong"
 KINDS = tuple(  # file, metric or column, kind of value; the first that fits
     (file, pattern, kind)
@@ -126,11 +129,11 @@ def _compared(file: str, here: Mapping[tuple, Mean], there: Mapping[tuple, Mean]
     for one, other, verb in ((there, here, "lacks"), (here, there, "adds to the reference")):
         if extra := [key for key in one if key not in other]:
             return DIFFERENT, f"{verb} {len(extra)} of {len(one)} values, such as {' / '.join(extra[0])}"
-    differences = {key: here[key].value - mean.value for key, mean in there.items() if here[key].value != mean.value}
+    differences = {key: here[key].value - mean.value for key, mean in there.items() if not _same(here[key], mean)}
     if not differences:
         return IDENTICAL, f"all {len(there)} values"
     limits = {key: allowance.limit(file, there[key]) for key in differences}
-    excess = {key: abs(x) / limits[key] if limits[key] else math.inf for key, x in differences.items()}
+    excess = {key: abs(x) / limits[key] if limits[key] and x == x else math.inf for key, x in differences.items()}
     beyond = [key for key in differences if excess[key] > 1]
     worst = max(differences, key=lambda key: excess[key])
     mean, difference, limit = there[worst], differences[worst], limits[worst]
@@ -141,6 +144,10 @@ def _compared(file: str, here: Mapping[tuple, Mean], there: Mapping[tuple, Mean]
     counts = f"{len(differences)} of {len(there)} values differ"
     counts += f", {len(beyond)} by more than rounding explains" if beyond else ""
     return DIFFERENT if beyond else ROUNDING, f"{counts}; the worst, {' / '.join(worst)}: {largest}"
+
+
+def _same(one: Mean, other: Mean) -> bool:
+    return one.value == other.value or (math.isnan(one.value) and math.isnan(other.value))
 
 
 def device_of(folder: Path, file: str) -> str:
@@ -155,14 +162,19 @@ def read_means(path: Path, samples_of_source: Mapping[str, int] = MappingProxyTy
 
     `samples_of_source` counts the test samples of all seeds, for tidy files that do not.
     """
+    require_file(path, "no such file", REMEDY, LARGEST_BYTES)
     table = read_csv(path, (), others=ANY)
     heads, rows, means = list(table), table.to_dict("records"), {}
     if tuple(heads) == TIDY_COLUMNS:
+        if table.duplicated([*KEYS, "seed"]).any():
+            raise InputError(path, "has a quantity of a seed twice", REMEDY)
         values: dict[tuple[str, ...], list[float]] = defaultdict(list)
         for row in rows:
             values[tuple(row[name] for name in KEYS)].append(finite_number(path, "value", row["value"]))
         for key, values_R in values.items():
             *place, quantity, concept = key
+            if quantity in SAMPLE_COUNTS and min(values_R) < 0:
+                raise InputError(path, f"'{quantity}' is negative", REMEDY)
             mean, low, _ = mean_interval(values_R)
             counts = [(*place, name, part) for name in SAMPLE_COUNTS for part in (concept, "all")]
             samples = next((sum(values[key]) for key in counts if key in values), samples_of_source.get(place[1], 0))
@@ -171,17 +183,24 @@ def read_means(path: Path, samples_of_source: Mapping[str, int] = MappingProxyTy
     elif "mean" in heads[1:]:
         # A column of yes and no is a result that follows from the means, not a label.
         labels = [name for name in heads[: heads.index("mean")] if not {row[name] for row in rows} <= {"yes", "no"}]
+        seen: Counter = Counter()
         for row in rows:
             mean, low, high = (
                 finite_number(path, name, row[name]) if row.get(name) else math.nan
                 for name in ("mean", "ci_low", "ci_high")
             )
             half_width = 0.0 if math.isnan(low) or math.isnan(high) else max(mean - low, high - mean)
-            samples = finite_number(path, "n_test", row.get("n_test") or "0")
-            key, seeds = tuple(row[name] for name in labels), int(row.get("n_seeds") or 1)
-            means[key] = _mean(f"tables/{path.name}", mean, half_width, key[-1], samples, seeds)
+            samples, seeds = (finite_number(path, name, row.get(name) or "0") for name in ("n_test", "n_seeds"))
+            if samples < 0 or seeds < 0:
+                raise InputError(path, "counts fewer than no samples or seeds", REMEDY)
+            key = tuple(row[name] for name in labels)
+            seen[key] += 1
+            further = (f"row {seen[key]} of these names",) if seen[key] > 1 else ()
+            means[*key, *further] = _mean(f"tables/{path.name}", mean, half_width, key[-1], samples, int(seeds) or 1)
+        if all(math.isnan(mean.value) for mean in means.values()):
+            raise InputError(path, "has no mean at all", REMEDY)
     else:
-        raise InputError(path, "is neither tidy metrics nor a table", "regenerate it")
+        raise InputError(path, "is neither tidy metrics nor a table", REMEDY)
     return {key: mean for key, mean in means.items() if not fnmatchcase(mean.quantity, TIMES)}
 
 

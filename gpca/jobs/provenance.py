@@ -18,12 +18,19 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from gpca.errors import InputError
 from gpca.io.files import require_outputs, sha256_of_file, write_text
+from gpca.io.structured_text import read_json
 from gpca.process.code_files import ROOT
 from gpca.process.processor import describe
 
 LIBRARIES = ("numpy", "scipy", "torch", "gpytorch", "open3d-cpu", "scikit-learn", "numba", "trimesh", "snakemake")
 RECORD = ".provenance.json"  # end of the name of a record
+DEVICE = ("vendor", "family", "model", "instructions", "name", "gpu")
+_FIELDS: Mapping[str, type] = {
+    **dict.fromkeys(("code", "config_sha256", "device", "libraries"), dict),
+    **dict.fromkeys(("environment_lock_sha256", "python"), str),
+}
 CONFIG_VARIABLE = "GPCA_CONFIG_SHA256"  # hash of each section, JSON, for jobs
 
 
@@ -73,9 +80,23 @@ def record_path(path: Path) -> Path:
 
 
 def read_record(path: Path) -> dict[str, Any]:
-    """Return the provenance record of a file, empty where there is none."""
-    record = record_path(path)
-    return json.loads(record.read_text(encoding="utf-8")) if record.is_file() else {}
+    """Return the provenance record of a file, empty where there is none; InputError for a damaged one.
+
+    Fields that are null or missing are empty.
+    """
+    record, remedy = record_path(path), f"make {path.name} again"
+    if not os.path.lexists(record):
+        return {}
+    content = read_json(record, "a provenance record", remedy)
+    for name, kind in _FIELDS.items():
+        content[name] = content.get(name) or kind()
+        if not isinstance(content[name], kind):
+            raise InputError(record, f"'{name}' is no {kind.__name__}", remedy)
+    texts = [each for name in ("config_sha256", "libraries", "code") for each in content[name].values()]
+    texts += [content["device"].get(name) for name in DEVICE]
+    if not all(isinstance(text, str | bool | None) for text in texts):
+        raise InputError(record, "has numbers or lists in the place of texts", remedy)
+    return content
 
 
 def sha256_of_settings(settings: object) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from gpca.comparison.published import TABLES, TEXT
 from gpca.comparison.verdicts import CLOSE, COMPARISON_COLUMNS, NOT_REPRODUCED, REPRODUCED
+from gpca.errors import refusing
 from gpca.io.csv_file import read_csv
 
 TONES = {REPRODUCED: "good", CLOSE: "near", NOT_REPRODUCED: "bad"}  # other verdicts judge nothing
@@ -56,30 +57,33 @@ def number_of(row: Mapping[str, str]) -> tuple[str, str, str]:
 def _rows(path: str | Path) -> list[dict[str, str]]:
     """Return the entries as printed; texts stay as they are."""
     rows = []
-    for row in read_csv(path, COMPARISON_COLUMNS).to_dict("records"):
-        printed = {}
-        for name in _NUMBERS:  # numbers in round tens have -1 decimals
-            text, decimals = row[name], max(0, int(row["decimals"]))
-            value = float(text) if text not in ("", "nan") else None
-            short = value is not None and value and not round(value, decimals)  # would be printed as 0
-            printed[name] = "" if value is None else f"{value:.1g}" if short else f"{value:.{decimals}f}"
-        upper, deviation = printed["upper"], printed["deviation"]
-        apart = REPEAT if row["repeat_of"] else DEVIATION if row["statistic"] == "deviation" else ""
-        repeat = f"repeat of {row['repeat_of']}" if row["repeat_of"] else ""
-        low, high = printed["ci_low"], printed["ci_high"]
-        published = printed["published"] + (f" to {upper}" if upper else "") + (f" ± {deviation}" if deviation else "")
-        rows.append(
-            {
-                **{name: row[name] for name in ("table", "row", "column", "unit", "n", "verdict")},
-                "group": apart or row["verdict"],
-                "reason": "; ".join(filter(None, (repeat, row["reason"]))),
-                "tone": TONES.get(row["verdict"], ""),
-                "objects": ", ".join(filter(None, (row["objects"], row["hardware"]))),
-                "published": published,
-                "reproduced": ("> " if row["at_least"] == "True" else "") + printed["reproduced"],
-                "interval": f"[{low}, {high}]" if low and high else "",
-                "difference": printed["difference"],
-                "factor": f"× {float(row['factor']):.2g}" if row["factor"] else "",
-            }
-        )
+    for number, row in enumerate(read_csv(path, COMPARISON_COLUMNS).to_dict("records"), 2):
+        with refusing(f"{path}, line {number}", "holds no numbers of a comparison ({})", "regenerate it"):
+            rows.append(_printed(row))
     return rows
+
+
+def _printed(row: Mapping[str, str]) -> dict[str, str]:
+    printed = {}
+    for name in _NUMBERS:  # numbers in round tens have -1 decimals
+        text, decimals = row[name], max(0, int(row["decimals"]))
+        value = float(text) if text not in ("", "nan") else None
+        short = value is not None and value and not round(value, decimals)  # would be printed as 0
+        printed[name] = "" if value is None else f"{value:.1g}" if short else f"{value:.{decimals}f}"
+    upper, deviation = printed["upper"], printed["deviation"]
+    apart = REPEAT if row["repeat_of"] else DEVIATION if row["statistic"] == "deviation" else ""
+    repeat = f"repeat of {row['repeat_of']}" if row["repeat_of"] else ""
+    low, high = printed["ci_low"], printed["ci_high"]
+    published = printed["published"] + (f" to {upper}" if upper else "") + (f" ± {deviation}" if deviation else "")
+    return {
+        **{name: row[name] for name in ("table", "row", "column", "unit", "n", "verdict")},
+        "group": apart or row["verdict"],
+        "reason": "; ".join(filter(None, (repeat, row["reason"]))),
+        "tone": TONES.get(row["verdict"], ""),
+        "objects": ", ".join(filter(None, (row["objects"], row["hardware"]))),
+        "published": published,
+        "reproduced": ("> " if row["at_least"] == "True" else "") + printed["reproduced"],
+        "interval": f"[{low}, {high}]" if low and high else "",
+        "difference": printed["difference"],
+        "factor": f"× {float(row['factor']):.2g}" if row["factor"] else "",
+    }

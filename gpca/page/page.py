@@ -14,7 +14,7 @@ from gpca.alignment.icp import ICPSettings
 from gpca.causes.settings import CauseSettings
 from gpca.errors import InputError
 from gpca.io.files import write_text
-from gpca.jobs.provenance import read_record, sha256_of_settings
+from gpca.jobs.provenance import DEVICE, read_record, sha256_of_settings
 from gpca.model.scene import ASSETS
 from gpca.page.comparison import page_comparison
 from gpca.page.findings import Titles, findings_of
@@ -130,11 +130,11 @@ def read_provenance(files: Iterable[Path]) -> dict[str, dict[str, int]]:
     for path in files:
         values = {"Code": "not recorded"}
         if record := read_record(path):
-            sections, device = record["config_sha256"], record["device"]
-            commit = record["code"]["commit"] or "outside a git checkout"
+            sections, device = record["config_sha256"], {name: record["device"].get(name) or "" for name in DEVICE}
+            commit = record["code"].get("commit") or "outside a git checkout"
             kind = f"{device['vendor']}, family {device['family']}, model {device['model']}, {device['instructions']}"
             values = {
-                "Code": f"{commit} with uncommitted changes" if record["code"]["dirty"] else commit,
+                "Code": f"{commit} with uncommitted changes" if record["code"].get("dirty") else commit,
                 # One hash for all sections; a step run by hand has none.
                 "Config (SHA-256)": sha256_of_settings(sections) if sections else "none",
                 "Packages, environment.lock (SHA-256)": record["environment_lock_sha256"],

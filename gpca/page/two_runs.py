@@ -10,14 +10,16 @@ from os.path import commonpath, relpath
 from pathlib import Path
 from typing import NamedTuple
 
-from gpca.errors import InputError
-from gpca.io.files import write_text
+from gpca.errors import InputError, refusing
+from gpca.io.files import require_file, sha256_of_file, write_text
 from gpca.jobs.provenance import read_record
 from gpca.page.comparison import number_of, page_comparison
 from gpca.page.page import read_provenance, render
 
 SAME, DIFFERENT, APART, ALONE = "same", "different", "apart", "alone"  # kinds of a cell of both runs
 CONFIG = "Config (SHA-256)"  # of all sections, which are compared one by one instead
+AGAIN = "make the run again"
+LARGEST_BYTES = 10**7  # of a table, hundreds of times the largest
 LEFT = ":--"  # alignment of columns of names in Markdown
 _CELLS = re.compile(r"(?<!\\)\|")
 _DIGITS = r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
@@ -59,17 +61,16 @@ class PrintedNumber(NamedTuple):
 
 def read_printed_table(path: Path) -> PrintedTable:
     """Read the Markdown that :meth:`gpca.reporting.tables.table.Table.write` wrote; an InputError for another file."""
-    try:
+    require_file(path, "no such file", AGAIN, LARGEST_BYTES)
+    with refusing(path, "is not readable ({})", AGAIN):
         text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as fault:
-        raise InputError(path, f"is not readable ({fault})", "make the run again") from fault
     lines = []
     for line in text.splitlines():
         if line.startswith("| "):
             cells = [cell.strip().replace("\\|", "|") for cell in _CELLS.split(line)[1:-1]]
             lines.append([re.sub(r"\A\*\*(.+)\*\*\Z", r"\1", cell) for cell in cells])
     if len(lines) < 2 or any(len(line) != len(lines[0]) for line in lines):
-        raise InputError(path, "holds no table, or one with rows of several lengths", "make the run again")
+        raise InputError(path, "holds no table, or one with rows of several lengths", AGAIN)
     heads, rule, *rows = lines
     caption = text.split("\n", 1)[0].strip("*")
     return PrintedTable(caption, heads, sum(cell == LEFT for cell in rule), rows)
@@ -171,13 +172,18 @@ def write_comparison(
             {
                 "name": name,
                 "title": titles.get(name, name),
-                "same": figures[0][name].read_bytes() == figures[1][name].read_bytes(),
+                "same": len({_digest(each[name]) for each in figures}) == 1,
                 "paths": [relpath(each[name].resolve(), path.parent.resolve()) for each in figures],
             }
             for name in _shared(figures, titles)
         ],
     )
     write_text(path, text)
+
+
+def _digest(path: Path) -> str:
+    require_file(path, "no such file", AGAIN)
+    return sha256_of_file(path)
 
 
 def _recorded(folder: Path) -> tuple[dict[str, dict[str, int]], dict[str, frozenset[str]], dict[tuple[str, ...], dict]]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gpca.causes.judged import CEILING, SMALLER_IS_BETTER
+from gpca.errors import InputError
 from gpca.evaluation.intervals import REPEATS
 from gpca.evaluation.measures import POOLED
 from gpca.experiments.cause_tables import AGAIN, SHOWN
@@ -153,6 +154,8 @@ def as_text(table: Table) -> str:
 
 def read_submissions(folder: Path) -> tuple[dict[str, list[Submission]], list[str]]:
     """Return the submissions of a folder by track, and the faults of all files, a line each."""
+    if not folder.is_dir():
+        raise InputError(folder, "no such folder", "name the folder of the submissions")
     submissions: dict[str, list[Submission]] = {}
     published: dict[str, Published] = {}
     faults: list[str] = []

@@ -194,10 +194,16 @@ HEAD, TABLE_HEAD = ",".join(TIDY) + "\n", ",".join(HEADS) + "\n"
     [
         ("metrics.csv", "attribution\n1\n", "is neither tidy metrics nor a table; regenerate it"),
         ("metrics.csv", "attribution\n", "has no rows; regenerate it"),
-        ("metrics.csv", "", "is empty; make it with snakemake"),
+        ("metrics.csv", "", "is empty; regenerate it"),
         ("metrics.csv", HEAD + "a,ycb,gpca,accuracy,all,0,nan\n", "'value' is 'nan', not a finite number; regenerate"),
         ("metrics.csv", HEAD + "a,ycb,gpca,accuracy,all,0,0.9,0.8\n", "has rows with more entries than columns"),
         ("metrics.csv", HEAD + "a,ycb,gpca\n", "'value' is '', not a finite number"),
+        ("metrics.csv", HEAD + 2 * "a,ycb,gpca,accuracy,all,0,0.9\n", "has a quantity of a seed twice"),
+        ("metrics.csv", HEAD + "a,ycb,gpca,test_samples,all,0,-5\n", "'test_samples' is negative"),
+        (TABLE, TABLE_HEAD + "ycb,gpca,,,,5,100,False\n", "has no mean at all"),
+        (TABLE, TABLE_HEAD + "ycb,gpca,1,1,2,5,-100,False\n", "counts fewer than no samples or seeds"),
+        ("metrics.csv.provenance.json", '{"config_sha256": [1]}', "'config_sha256' is no dict; make metrics.csv again"),
+        ("metrics.csv.provenance.json", '{"device": ', "is not a provenance record"),
         (TABLE, TABLE_HEAD + "ycb,gpca,many,1,2,5,100,False\n", "'mean' is 'many', not a finite number"),
     ],
 )
@@ -207,6 +213,15 @@ def test_a_broken_file_is_named(folders, capsys, broken, content, message):
     line = one_line(capsys)
     assert str(folders[0] / broken) in line
     assert message in line
+
+
+def test_an_empty_mean_is_no_number_and_a_row_that_is_there_twice_is_another(folders):
+    row = "ycb,gpca,1,1,2,5,100,False\n"
+    for folder, rows in zip(folders, (row.replace(",1,1,2", ",,,") + row.replace("ycb", "b"), row + row), strict=True):
+        (folder / TABLE).write_text(TABLE_HEAD + rows)
+    assert outcomes(folders)[TABLE].verdict == "different"
+    (folders[0] / TABLE).write_text(TABLE_HEAD + row.replace(",1,1,2", ",,,") + row)
+    assert outcomes(folders)[TABLE].verdict == "different"
 
 
 def test_no_run_and_no_reference(folders, capsys):

@@ -1,11 +1,13 @@
 """Two runs side by side: `gpca compare`, and how printed tables are read back."""
 
+import os
 import re
 
 import numpy as np
 import pytest
 
 from gpca.__main__ import main
+from gpca.comparison.verdicts import COMPARISON_COLUMNS
 from gpca.errors import InputError
 from gpca.page.two_runs import compare_tables, read_number, read_printed_table
 from gpca.reporting.tables.table import Cell, Column, Table
@@ -96,5 +98,24 @@ def test_a_folder_without_tables_is_refused(two_runs, tmp_path, capsys):
 def test_a_damaged_table_is_named(text, tmp_path):
     path = tmp_path / "mine.md"
     path.write_text(text)
-    with pytest.raises(InputError, match=r"mine\.md: holds no table"):
+    with pytest.raises(InputError, match=r"mine\.md: (holds no table|is empty)"):
         read_printed_table(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "spoil"),
+    [
+        ("tables/*.md", lambda path: (path.unlink(), os.mkfifo(path))),
+        ("metrics.csv.provenance.json", lambda path: path.write_text('{"libraries": ["numpy"]}')),
+        ("metrics.csv.provenance.json", lambda path: path.write_text('{"device": {"name": {}}}')),
+        ("metrics.csv.provenance.json", os.mkdir),
+        ("comparison.csv", lambda path: path.write_text(f"{','.join(COMPARISON_COLUMNS)}\n{',' * 99}\n"[:400])),
+    ],
+)
+def test_a_damaged_run_is_named_with_its_file(two_runs, tmp_path, capsys, name, spoil):
+    (two_runs[0] / "metrics.csv").touch()
+    path = next(two_runs[0].glob(name), two_runs[0] / name)
+    spoil(path)
+    assert main(["compare", *map(str, two_runs), "--out", str(tmp_path / "page.html")]) == 2
+    said = capsys.readouterr().err
+    assert path.name in said and len(said.splitlines()) == 1

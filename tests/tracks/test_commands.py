@@ -140,6 +140,11 @@ def test_the_submissions_of_the_repository_are_without_fault():
     assert main(["leaderboard", "--check"]) == 0
 
 
+def test_a_folder_of_submissions_that_is_not_there_is_no_empty_one(capsys):
+    assert main(["leaderboard", "--check", "--submissions", "nowhere"]) == 2
+    assert "nowhere: no such folder" in capsys.readouterr().err
+
+
 def test_a_faulty_submission_makes_no_page(board, capsys):
     text = (board / "rmse.csv").read_text()
     (board / "rmse.csv").write_text(text.replace(f"\n{SOURCE},100,0,", f"\n{SOURCE},100,99,"))
