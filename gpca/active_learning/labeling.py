@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import csv
+import re
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
 from gpca.active_learning.acquisition import Pool, select
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
-from gpca.errors import InputError
-from gpca.io.arrays import TEXT, WHOLE, write_arrays
+from gpca.errors import InputError, refusing
+from gpca.io.arrays import TEXT, WHOLE, load_arrays, write_arrays
 from gpca.io.container import Container, array
-from gpca.io.files import append_row, require_file, whole_file
+from gpca.io.files import Axes, append_row, printable, require_file, whole_file
 from gpca.numerals import whole
 from gpca.pairs.dataset import ragged
 from gpca.seeds import generator
@@ -28,6 +29,7 @@ SKIPPED = ""  # concept of a sample that the person skipped
 QUEUE_VERSION = 1
 QUEUE_MARK = "queued"  # array that tells a queue from the registrations of a run
 LONGEST_NAME = 200  # characters
+LARGEST_BYTES = 10**7  # of labels or answers
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,14 @@ class Queue(Container):
         """Return the target cloud (Q, 3) of row i."""
         return self.part("target_points", i)
 
+    @classmethod
+    def load(cls, path: str | Path, expected: Axes | Container | None = None) -> Self:
+        """Read the npz, which has to be of this version."""
+        version = int(load_arrays(path, {QUEUE_MARK: ()}, {QUEUE_MARK: WHOLE}, remedy=cls.remedy)[QUEUE_MARK])
+        if version != QUEUE_VERSION:
+            raise InputError(path, f"is a queue of version {version}, not {QUEUE_VERSION}", cls.remedy)
+        return super().load(path, expected)
+
     @property
     def marked(self) -> dict[str, np.ndarray]:
         """The arrays of a file, with the mark of a queue."""
@@ -72,7 +82,7 @@ def add_to_queue(path: str | Path, aligned: np.ndarray, target: np.ndarray, h_1_
     """
     path = Path(path)
     one = Queue(
-        object_name=np.array([" ".join(name.split())[-LONGEST_NAME:]]),
+        object_name=np.array([" ".join(printable(name).split())[-LONGEST_NAME:]]),
         h=h_1_d.astype(np.float32),
         **ragged([aligned.astype(np.float32)], [target.astype(np.float32)]),
     )
@@ -97,8 +107,11 @@ class LabelFile:
         if not self.path.exists() or (self.path.is_file() and not self.path.stat().st_size):
             return
         remedy = "correct or remove the line"
-        require_file(self.path, "no such file", remedy)
-        with self.path.open(newline="", encoding="utf-8-sig", errors="replace") as file:
+        require_file(self.path, "no such file", remedy, LARGEST_BYTES)
+        with (
+            refusing(self.path, "is not a readable CSV file ({})", remedy),
+            self.path.open(newline="", encoding="utf-8-sig", errors="replace") as file,
+        ):
             head, *rows = [*filter(None, csv.reader(file))] or [[*LABEL_COLUMNS]]
         if missing := [column for column in LABEL_COLUMNS if column not in head]:
             raise InputError(self.path, f"column '{missing[0]}' is missing", remedy)
@@ -133,8 +146,9 @@ def require_name(concept: str, subject: object = "concept") -> None:
     """Raise an InputError unless the concept can name a column: lowercase letters, digits and _."""
     if not concept:
         raise InputError(subject, "the concept has no name", "give one, e.g. 'occlusion'")
-    if not (concept.isascii() and concept.isidentifier() and concept == concept.lower()):
-        raise InputError(subject, f"'{concept}' is not a valid concept name", "use lowercase letters, digits and _")
+    if not re.fullmatch(r"[a-z_][a-z0-9_]{0,39}", concept):
+        fault = f"'{concept[:40]}' is not a valid concept name"
+        raise InputError(subject, fault, "use at most 40 lowercase letters, digits and _")
 
 
 @dataclass(frozen=True)

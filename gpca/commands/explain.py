@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from gpca.commands.explain_inputs import FILES, Inputs, from_rows, from_words, inputs_in, target_reader
 from gpca.errors import InputError
-from gpca.io.files import require_apart
+from gpca.io.files import printable, require_apart
 from gpca.jobs.arguments import length
 from gpca.model.location import model_path, require_model
 from gpca.objects.surface import METERS_PER_UNIT
@@ -150,10 +150,11 @@ def run_explain(options: Namespace) -> int:
             explanation = explain(**arguments)
         except InputError as fault:
             raise InputError(each.source, str(fault)) from fault
-        _write(options, explanation, {"source": str(each.source), "target": str(each.target), **names}, extra)
+        files = {"source": printable(each.source), "target": printable(each.target)}
+        _write(options, explanation, files | names, extra)
         statuses.add(explanation.status)
         if isinstance(explanation, Explanation):
-            _queue(options.queue, explainer, explanation, f"{each.source} to {each.target}")
+            _queue(options.queue, explainer, explanation, " to ".join(files.values()))
 
     for each, arguments in given:
         explain_one(each, arguments)

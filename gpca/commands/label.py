@@ -6,17 +6,28 @@ Answers may come from a file or a pipe. Each is saved before the next question, 
 
 from __future__ import annotations
 
+import io
 import sys
+import zipfile
 from argparse import ArgumentParser, Namespace
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
-from gpca.active_learning.labeling import SKIPPED, LabelFile, Question, Queue, Session, is_queue, require_name
+from gpca.active_learning.labeling import (
+    LARGEST_BYTES,
+    SKIPPED,
+    LabelFile,
+    Question,
+    Queue,
+    Session,
+    is_queue,
+    require_name,
+)
 from gpca.attribution.predictions import write_predictions
 from gpca.classifier.scores import Attribution
 from gpca.classifier.settings import GPCSettings
-from gpca.errors import InputError
+from gpca.errors import InputError, refusing
 from gpca.io.files import require_apart, require_file
 from gpca.jobs.arguments import COUNT
 from gpca.jobs.provenance import record_provenance
@@ -54,6 +65,8 @@ def add_label_arguments(parser: ArgumentParser) -> None:
 def run_label(options: Namespace) -> None:
     settings = read_settings(GPCSettings, {"learning_rate": 0.2, "iterations": 150} | options.settings)
     require_file(options.registrations, "no such file", "make it with Snakemake, or by 'gpca explain --queue'")
+    if not zipfile.is_zipfile(options.registrations):
+        raise InputError(options.registrations, "is damaged, or not an npz archive", "make it again")
     queued = is_queue(options.registrations)
     require_apart(options, ["labels", "picture", "predictions", "out"], [model_path(options.model)] if queued else [])
     place = "is not for the queue of an explanation" if queued else "is for the queue of an explanation alone"
@@ -81,9 +94,12 @@ def run_label(options: Namespace) -> None:
             start |= {keys[row]: str(registrations.concept[row]) for row in rows}
     labels = LabelFile(options.labels, dict.fromkeys(keys))
     session = Session(h_S_d, keys, start, labels, settings, options.strategy, gpc=None if model is None else model.gpc)
+    answers: TextIO = sys.stdin
     if options.answers is not None:
-        require_file(options.answers, "no such file", "give a text file with one answer per line")
-    answers = sys.stdin if options.answers is None else options.answers.open(encoding="utf-8")
+        remedy = "give a text file in UTF-8 with one answer per line"
+        require_file(options.answers, "no such file", remedy, LARGEST_BYTES)
+        with refusing(options.answers, "is not text in UTF-8 ({})", remedy):
+            answers = io.StringIO(options.answers.read_text(encoding="utf-8-sig"))
     questions_asked = 0
     print(f"{len(start)} labeled at the start, {len(session.answered)} answered before, {len(keys)} samples")
     print("answer with a concept or with " + ", ".join(f"{name} ({what})" for name, what in COMMANDS.items()))

@@ -171,10 +171,15 @@ def full_disk_named(path: Path) -> Iterator[None]:
         raise InputError(path, words, "free some, or name a place on another") from fault
 
 
+def printable(text: object) -> str:
+    """Return a text, such as a path, with escapes for what UTF-8 cannot hold: bytes of another encoding."""
+    return str(text).encode("utf-8", "backslashreplace").decode("utf-8")
+
+
 def write_text(path: str | Path, text: str) -> None:
-    """Write a text in UTF-8, whole or not at all; what UTF-8 lacks, as in names of other encodings, is escaped."""
+    """Write a text that is :func:`printable`, whole or not at all."""
     with whole_file(path) as partial:
-        partial.write_text(text, encoding="utf-8", errors="backslashreplace")
+        partial.write_text(printable(text), encoding="utf-8")
 
 
 def append_row(path: Path, row: Sequence[object], head: Sequence[object]) -> None:

@@ -95,6 +95,6 @@ def draw_explanation(explanation: Explanation, png_path: str | Path, names: str 
     text = "\n".join(wrapped[:MOST_LINES] + ["…"] * (len(wrapped) > MOST_LINES))
     text_look = {"va": "top", "ha": "left", "fontsize": style.SMALL_PT, "linespacing": 1.4, "in_layout": False}
     right.set_axis_off()
-    right.text(0, 1, text, transform=right.transAxes, **text_look)
+    right.text(0, 1, text, transform=right.transAxes, parse_math=False, **text_look)
     style.write_title(figure, names)
     style.save_png(figure, png_path)

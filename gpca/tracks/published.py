@@ -14,10 +14,10 @@ import numpy as np
 
 from gpca.causes.judged import SampleTruth
 from gpca.causes.truth import Truth
-from gpca.errors import InputError
+from gpca.errors import InputError, refusing
 from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays
 from gpca.io.container import FLAG, Container, array
-from gpca.io.files import whole_file
+from gpca.io.files import require_file, require_memory, whole_file
 from gpca.objects.source import DATA
 from gpca.process.code_files import ROOT
 from gpca.tracks.track import Track
@@ -169,13 +169,15 @@ _WORDS = ("name", "title", "reads", "icp_calls")
 
 def sha256_of_arrays(path: str | Path) -> str:
     """Return the hexadecimal SHA-256 of the arrays of an npz, their names, types and shapes, however it is packed."""
-    digest = hashlib.sha256()
-    try:
+    digest, remedy = hashlib.sha256(), "remove it; it is made anew"
+    require_file(path, "no such file", remedy, np.inf)
+    with refusing(path, "is not a readable npz archive", remedy):
+        with zipfile.ZipFile(path) as archive:
+            size = sum(info.file_size for info in archive.infolist())
+        require_memory(size, Path(path).stat().st_size, path, remedy)
         with np.load(path, allow_pickle=False) as arrays:
             for name in sorted(arrays.files):
                 array = np.ascontiguousarray(arrays[name])
                 digest.update(f"{name}|{array.dtype.str}|{array.shape}|".encode())
                 digest.update(array.tobytes())
-    except (OSError, ValueError, zipfile.BadZipFile) as fault:
-        raise InputError(path, "is not a readable npz archive", "remove it; it is made anew") from fault
     return digest.hexdigest()

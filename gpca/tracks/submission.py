@@ -42,7 +42,8 @@ KEYS = ("source", "seed", "sample")
 NO_LINK = "none"
 LINK_REMEDY = f"give an address that begins with https://, or {NO_LINK}"
 NAMED = "named"  # optional column: the predicted label, empty for none; by default that of the largest score
-LARGEST_BYTES = 10**8
+LARGEST_BYTES = 10**7
+MOST_LINES = 10**5
 MOST_FAULTS = 20  # in the list
 
 
@@ -82,9 +83,17 @@ def read_submission(path: Path, published: Published) -> tuple[Submission | None
     except UnicodeDecodeError:
         fault("", "is not a text file in UTF-8", "write it anew")
         return None, faults
+    if len(lines) > MOST_LINES:
+        fault(
+            "", f"has {len(lines)} lines, more than {MOST_LINES}", "give a row for each test sample, and few comments"
+        )
+        return None, faults
     length = next((number for number, line in enumerate(lines) if not line.startswith("#")), len(lines))
     head = _read_head(lines[:length], published, fault)
-    predictions = _read_rows(lines[length:], length, published, fault)
+    try:
+        predictions = _read_rows(lines[length:], length, published, fault)
+    except csv.Error as damage:
+        fault("", f"is not a readable CSV file ({damage})", "write it anew")
     if len(faults) > MOST_FAULTS:
         faults = [*faults[:MOST_FAULTS], f"{path}: {len(faults) - MOST_FAULTS} faults more"]
     if faults or predictions is None:

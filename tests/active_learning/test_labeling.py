@@ -61,6 +61,8 @@ def test_a_file_without_answers_is_a_start_and_the_same_answer_twice_no_conflict
         ("3,train,two words\n", r"line 2: 'two words' is not a valid concept name"),
         ("3,tra", r"line 2: has 2 entries, not 3; correct or remove the line"),
         ("3,tra,pose\n", r"line 2: no sample '3' of split 'tra'"),
+        (f"3,train,{'p' * 10**4}\n", r"line 2: 'p{40}' is not a valid concept name; use at most 40"),
+        (f"3,train,{'p' * 10**6}\n", r"is not a readable CSV file \(field larger"),
         ("3,train,pose,1\n", r"line 2: has 4 entries, not 3"),
         ('3,train,"po\nse"\n', r"line 2: 'po.*se' is not a valid concept name"),
     ],

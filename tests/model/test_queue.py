@@ -5,6 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
+from gpca.__main__ import main
 from gpca.active_learning.labeling import Queue, add_to_queue, is_queue
 from gpca.errors import InputError
 
@@ -50,3 +51,40 @@ def test_two_that_queue_at_once_lose_nothing(explained, tmp_path):
     with ThreadPoolExecutor(4) as pool:
         assert sorted(pool.map(add, range(12))) == list(range(1, 13))
     assert len(set(Queue.load(tmp_path / "queued.npz").object_name)) == 12
+
+
+def test_a_queue_of_another_version_or_without_rows_is_refused(explained, tmp_path):
+    path, clouds = tmp_path / "queued.npz", (explained.scene.aligned, explained.scene.target)
+    add_to_queue(path, *clouds, np.zeros((1, 4)), "a to b")
+    marked = Queue.load(path).marked
+    np.savez(path, **marked | {"queued": np.array(2)})
+    with pytest.raises(InputError, match=r"queued.npz: is a queue of version 2, not 1; queue the registrations again"):
+        Queue.load(path)
+    np.savez(path, **Queue(**{name: marked[name] for name in Queue.array_fields()}).subset(np.arange(0)).marked)
+    with pytest.raises(InputError, match="has no samples"):
+        Queue.load(path)
+
+
+@pytest.mark.parametrize(
+    ("queue", "answers", "line"),
+    [
+        ("short", "good", "short.npz: is damaged, or not an npz archive; make it again"),
+        ("good", "utf16", "utf16.txt: is not text in UTF-8"),
+        ("good", "long", "'pppppppppppppppppppppppppppppppppppppppp' is not a valid concept name"),
+    ],
+)
+def test_label_refuses_what_is_half_or_no_text(
+    explainer, explained, tmp_path, monkeypatch, capsys, queue, answers, line
+):
+    monkeypatch.chdir(tmp_path)
+    clouds = explained.scene.aligned, explained.scene.target
+    add_to_queue("good.npz", *clouds, explainer.embed(clouds[0]), "$\\frac{a$ \udcff to b")
+    (tmp_path / "short.npz").write_bytes((tmp_path / "good.npz").read_bytes()[:3000])
+    (tmp_path / "utf16.txt").write_text("pose\n", encoding="utf-16")
+    (tmp_path / "long.txt").write_text("p" * 10**6)
+    explainer.model.save("model.pt")
+    words = ["label", f"{queue}.npz", "--answers", f"{answers}.txt", "--labels", "labels.csv", "--model", "model.pt"]
+    (tmp_path / "good.txt").write_text("pose\n")
+    assert main(words) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 1 and line in said[0] and len(said[0]) < 300

@@ -113,3 +113,17 @@ def test_what_is_no_text_or_names_no_track_is_refused(shipped, tmp_path):
         track_in_head(path)
     with pytest.raises(InputError, match="no such file"):
         read_submission(tmp_path / "none.csv", shipped)
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("#\n" * 10**6, "has 1000000 lines, more than 100000"),
+        ("source\n" + "x" * 200_000, "is not a readable CSV file"),
+        ("source,seed,sample\n1e300,1e300,1e300\n", "column 'score_nominal' is missing"),
+    ],
+)
+def test_what_no_table_is_as_long_as_is_one_line(shipped, tmp_path, text, fault):
+    (tmp_path / "mine.csv").write_text(text)
+    submission, faults = read_submission(tmp_path / "mine.csv", shipped)
+    assert submission is None and any(fault in line and len(line) < 300 for line in faults)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gpca.io.files import whole_file
+from gpca.io.files import printable, whole_file
 
 MATPLOTLIBRC = str(Path(__file__).with_name("matplotlibrc"))
 COLUMN_WIDTH_IN, TEXT_WIDTH_IN = 3.5, 7.16  # one column of an IEEE paper, and both
@@ -64,7 +64,7 @@ def write_title(figure, words: str) -> None:
     height_in = figure.get_size_inches()[1]
     # A layout that is worked out by itself leaves room for a title that has no place of its own.
     place = {} if figure.get_layout_engine() else {"y": 1 - 0.02 / height_in}
-    figure.suptitle(words, x=0.005, ha="left", va="top", linespacing=1.15, **place)
+    figure.suptitle(printable(words), parse_math=False, x=0.005, ha="left", va="top", linespacing=1.15, **place)
 
 
 def blues():
