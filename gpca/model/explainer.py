@@ -164,14 +164,14 @@ class Explainer:
         if repair:
             with _timed(seconds, "repair"):
                 repaired = Repair.of(self.model, clouds, outcome, method if register else GIVEN, limit, unit=unit)
-        if voids:
+        if repaired is not None and repaired.verdict == REPAIRED:
+            decision = Decision(TAKE, "", repaired.reason)
+        elif voids:
             decision = Decision(CHECK, "", ", ".join(void.check for void in voids))
         elif diagnosis is None:
             decision = self.policy.decide(scores_C, float(bald), concepts=self.model.gpc.classes)
         elif diagnosis.state == NOMINAL:
             decision = Decision(NOTHING, "", diagnosis.remark)
-        elif repaired is not None and repaired.verdict == REPAIRED:
-            decision = Decision(TAKE, "", repaired.reason)
         else:
             decision = self._decided(diagnosis, register)
         return Explanation(

@@ -144,13 +144,16 @@ def search(pair: ObservedPair, settings: ReenactmentSettings, surface: ModelSurf
     return np.array([hypothesis.T for hypothesis in hypotheses]), weights_of(hypotheses)
 
 
-def decide(judge: ResultJudge, level: Calibrated, proposals: Proposals, tolerance: float) -> Verdict:
+def decide(
+    judge: ResultJudge, level: Calibrated, proposals: Proposals, tolerance: float, lost: bool = False
+) -> Verdict:
     """Return the verdict: a pose that is not called failed stays, another takes its place only if it is called good.
 
     If none is called good, the fewest most probable poses of which one is right are given, if they are called good so.
+    A lost registration, which ended away from the target, never stays.
     """
     probability_n = judge.probability(proposals.evidence, tolerance)
-    if probability_n[0] < level.threshold:
+    if probability_n[0] < level.threshold and not lost:
         return Verdict(GOOD, 0, (), probability_n)
     below, best = level.good_below, 1 + int(probability_n[1:].argmin())
     if probability_n[best] < below:

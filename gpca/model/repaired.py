@@ -8,12 +8,12 @@ from typing import Self
 
 import numpy as np
 
-from gpca.alignment.methods.interface import Outcome
+from gpca.alignment.methods.interface import Outcome, Pair
 from gpca.alignment.methods.registry import method_entry
 from gpca.causes.policy import NOTHING
 from gpca.causes.settings import OBSERVED
 from gpca.model import page
-from gpca.model.clouds import Clouds, voids_of
+from gpca.model.clouds import FEWEST_MATCHES, Clouds, voids_of
 from gpca.model.diagnosis import CHECK, TAKE, UNKNOWN, FittingPose
 from gpca.model.explanation import GIVEN, UNKNOWN_STATUS, ExplainedRegistration
 from gpca.model.file import Model
@@ -41,6 +41,7 @@ from gpca.model.result import calibrated_at
 from gpca.model.scene import Scene
 from gpca.numerals import in_decimals
 from gpca.objects.canonical import CanonicalFrame
+from gpca.reenactment.registration import pose_posterior
 from gpca.reenactment.surface import ModelSurface
 from gpca.rigid import transform
 from gpca.seeds import seed_of
@@ -48,6 +49,7 @@ from gpca.seeds import seed_of
 STATUSES = {GOOD: 0, REPAIRED: 0, UNKNOWN: UNKNOWN_STATUS, NOT_REPAIRED: 4, SEVERAL: 5}  # exit codes of the command
 ACTIONS = {GOOD: NOTHING, REPAIRED: TAKE}  # for the others, `CHECK`
 TONES = {GOOD: "good", REPAIRED: "good", NOT_REPAIRED: "bad"}  # CSS classes; for the others, "doubt"
+LOST = "the registration ended away from the target: poses were sought anywhere, and nothing is promised"
 ALONG = 0.95  # cosine of the angle to an axis within which that axis names a direction
 
 
@@ -112,7 +114,9 @@ class Repair(ExplainedRegistration):
         """
         frame, T_init, T = clouds.frame, clouds.T_target_source_init, outcome.T_target_source
         diagnoser, tolerance, T_registered = model.diagnoser, limit / frame.diameter, frame.pose_outside(T) @ T_init
-        voids = voids_of(clouds.source, clouds.target, outcome.fitness, model.familiar)
+        voids = voids_of(clouds.source, clouds.target, 1.0, model.familiar)
+        lost = round(outcome.fitness * len(clouds.source)) < FEWEST_MATCHES
+        unusual, _ = model.familiar.warnings(clouds.source, clouds.target)
         scene = Scene(clouds.source, clouds.target, T, frame, model.icp.correspondence_distance, tolerance)
         unrepaired = cls(
             T_target_source=T_registered,
@@ -126,7 +130,7 @@ class Repair(ExplainedRegistration):
             unit=unit,
             tolerance=limit,
             tolerance_share=tolerance,
-            warnings=(*map(str, voids), *model.familiar.warnings(clouds.source, clouds.target)[0]),
+            warnings=(*map(str, voids), *((LOST,) if lost else ()), *unusual),
             learned_from=model.learning,
             scene=scene,
         )
@@ -141,11 +145,14 @@ class Repair(ExplainedRegistration):
         if method not in (None, GIVEN) and not method_entry(method).is_global:
             refine = by_method(clouds.target, surface, method, seed_of("repair", method))
         measure = measured(before, pair.model, diagnoser.runs.icp, OBSERVED)
-        hypotheses = search(pair, diagnoser.reenactment, surface)
+        if lost:
+            hypotheses = pose_posterior(Pair(before, pair.model), diagnoser.reenactment, prior=False)
+        else:
+            hypotheses = search(pair, diagnoser.reenactment, surface)
         proposals = propose(clouds.source, surface, T, *hypotheses, refine, measure)
         proposals.evidence.fitness_N[0], proposals.evidence.inlier_rmse_N[0] = pair.fitness_n[0], pair.inlier_rmse_n[0]
         level = calibrated_at(diagnoser.levels, tolerance)
-        verdict = decide(diagnoser.judge, level, proposals, tolerance)
+        verdict = decide(diagnoser.judge, level, proposals, tolerance, lost)
         errors_n = diagnoser.judge.error(proposals.evidence)
         poses = [pose.outside(frame, T_init) for pose in other_poses(proposals, verdict, errors_n, surface)]
         if verdict.name != GOOD:
@@ -170,7 +177,7 @@ class Repair(ExplainedRegistration):
             result=probability_n[verdict.row],
             failed_from=level.threshold,
             good_below=level.good_below,
-            wrong=None if level.repaired_below is None else WRONG,
+            wrong=None if level.repaired_below is None or lost else WRONG,
             poses=tuple(poses),
             scene=replace(scene, T_repaired=T_repaired, T_others=tuple(proposals.T_n[list(verdict.rows)])),
         )
@@ -219,7 +226,7 @@ class Repair(ExplainedRegistration):
     @property
     def _promise(self) -> str:
         if self.wrong is None:
-            return "none: this model was not calibrated on repaired poses"
+            return "none: the model was not calibrated on such repairs"
         return f"at most {self.wrong:.0%} of the poses that are called repaired are wrong"
 
     @property

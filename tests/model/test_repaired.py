@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 import gpca
 from gpca import Explainer
@@ -89,10 +90,21 @@ def test_poses_that_fit_alike_are_given_with_what_tells_them_apart(wrong):
 
 def test_a_pair_without_meaning_is_unknown(explainer, pair):
     source, target = pair
-    repair = explainer.repair(source + 100 * np.ptp(target), target)
+    repair = explainer.repair(0.2 * source, target)
     assert (repair.verdict, repair.status, repair.result) == ("unknown", 3, None)
     assert repair.text().startswith("warning ")
     assert len(set(STATUSES.values()) - {0}) == 3
+
+
+def test_a_registration_far_from_the_target_is_repaired_without_its_start(wrong):
+    model, (source, target), _ = wrong
+    explainer, away = Explainer(model, device="cpu"), source + 100 * np.ptp(target)
+    assert explainer.explain(away, target).unknown
+    repair = explainer.repair(away, target)
+    assert repair.verdict in (REPAIRED, SEVERAL, NOT_REPAIRED)
+    assert repair.wrong is None and "poses were sought anywhere" in repair.text()
+    distance_N = cKDTree(target).query(transform(repair.poses[0].T_target_source, away))[0]
+    assert np.median(distance_N) < 0.05 * np.linalg.norm(np.ptp(target, axis=0))
 
 
 @pytest.fixture
