@@ -148,6 +148,7 @@ class Diagnoser:
         enactments = reenact(pair, self.reenactment, self.truth, surface)
         row = row_of(enactments, pair, self.reenactment, self.truth)
         reenacted = Reenacted.of(enactments, row["weight"][: len(enactments)], T_icp, surface)
+        reenacted = reenacted.with_fit(observed, T_icp, surface, open_ends=False)
         distance_K = surface.errors(T_icp @ inverses(row["T_model_observed"]))
         evidence = Evidence(distance_K[None], row["weight"][None], pair.inlier_rmse_n[:1], pair.fitness_n[:1])
         return reenactment_features(Reenactments.of_rows([row], self.truth))[0], evidence, reenacted, enactments

@@ -12,14 +12,17 @@ from gpca.causes.policy import NOTHING, QUEUE
 from gpca.causes.truth import ALL, FAILED, NOMINAL, shapley_values
 from gpca.evaluation.conformal import ALARM, GOOD
 from gpca.guarantee.guarantee import SEVERAL, Guarantee
+from gpca.model.undetermined import Undetermined, axis_in_words, undetermined_at
 from gpca.numerals import in_decimals
 from gpca.objects.bop import symmetric_turn
 from gpca.objects.canonical import CanonicalFrame
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reenactment.enactment import Enactment
 from gpca.reenactment.hypotheses import SAME
+from gpca.reenactment.scale import Scale, find_scale
 from gpca.reenactment.surface import ModelSurface
-from gpca.rigid import inverse, log
+from gpca.rigid import inverse, log, transform
+from gpca.seeds import generator
 
 if TYPE_CHECKING:
     from gpca.explainers.pair_classifier import Judgment
@@ -28,12 +31,11 @@ UNKNOWN = "unknown"  # state of a pair whose scores mean nothing
 LIKELY = 0.5  # probability from which a concept is named as a cause
 SMALLEST = 1e-9  # least probability of a cause
 IN_WORDS = {SEVERAL: "several causes"}
-AXES = ("x", "y", "z")
-ALONG_DEG = 15.0  # largest angle between a rotation axis and an axis of the target's frame that may name it
 SMALL_TURN_DEG = 3.0  # smaller rotations are not mentioned
 CHECK = "check"  # action for a pair whose scores mean nothing
 RERUN = "rerun"  # action where the re-enactment knows a better pose
 TAKE = "take"  # action where a repaired pose takes the place of the registered one
+RESCALE = "rescale"  # action where source and target differ in scale
 REFINE = "refine"  # action for a given pose from which a registration would succeed
 SURE = 0.5  # probability of a pose from which to rerun from it
 ADVICE = {  # per branch of the policy
@@ -45,6 +47,7 @@ ADVICE = {  # per branch of the policy
     RERUN: "rerun from pose 1",
     TAKE: "take the repaired pose",
     REFINE: "register from this pose",
+    RESCALE: "rescale the source, or check the units",
     QUEUE: "queue for labeling, so that the cause can be learned",
 }
 
@@ -165,14 +168,6 @@ def in_unit_of(frame: CanonicalFrame, values: Any, *names: str) -> dict[str, Any
     return {name: getattr(values, name) * frame.diameter for name in names}
 
 
-def axis_in_words(axis: Sequence[float]) -> str:
-    """Describe a unit vector (3,) in the target's frame."""
-    along = int(np.argmax(np.abs(axis)))
-    if abs(axis[along]) >= np.cos(np.deg2rad(ALONG_DEG)):
-        return f"the target's {AXES[along]} axis"
-    return f"the axis ({', '.join(f'{part:.2f}' for part in axis)}) of the target's frame"
-
-
 @dataclass(frozen=True)
 class Reenacted:
     """Counterfactuals of one registration under the hypotheses of its true pose.
@@ -186,6 +181,8 @@ class Reenacted:
     outliers: float  # share of the observed points
     missing: float  # share of the target that was not observed
     poses: tuple[FittingPose, ...]  # the hypotheses, most probable first
+    undetermined: Undetermined | None = None  # directions in which the most probable pose is free
+    scale: Scale | None = None  # of the source relative to the target
 
     @classmethod
     def of(
@@ -207,6 +204,17 @@ class Reenacted:
             ),
         )
 
+    def with_fit(self, observed: np.ndarray, T_result: np.ndarray, surface: ModelSurface, open_ends: bool) -> Reenacted:
+        """Add what a cloud (N, 3) at its initial pose leaves undetermined, and its scale.
+
+        With `open_ends`, the surface may go on where it was not seen.
+        """
+        first = self.poses[0]
+        T_k = [first.T_target_source] if first.registered else [first.T_target_source, T_result]
+        undetermined = undetermined_at(transform(T_k[0], observed), surface, self.noise, open_ends)
+        scale = find_scale(observed, T_k, surface, generator("diagnosis", "scale"))
+        return replace(self, undetermined=undetermined, scale=scale)
+
     @property
     def better(self) -> FittingPose | None:
         """The likeliest pose, if it is more likely than all others together and not the registration's result."""
@@ -217,7 +225,10 @@ class Reenacted:
         """Convert to the user's frame and unit of length, in which the initial pose is given."""
         effects = {cause: effect * frame.diameter for cause, effect in self.effects.items()}
         poses = tuple(pose.outside(frame, T_target_source_init) for pose in self.poses)
-        return replace(self, effects=effects, poses=poses, **in_unit_of(frame, self, "error", "noise"))
+        undetermined = self.undetermined and self.undetermined.outside(frame)
+        scale = self.scale and replace(self.scale, **in_unit_of(frame, self.scale, "error"))
+        parts: dict[str, Any] = {"effects": effects, "poses": poses, "undetermined": undetermined, "scale": scale}
+        return replace(self, **parts, **in_unit_of(frame, self, "error", "noise"))
 
     def as_dict(self) -> dict[str, object]:
         """Values for JSON."""
@@ -238,11 +249,21 @@ class Reenacted:
         poses = zip(self.words(subject, unit), self.poses, strict=True)
         return [f"pose {k}    {words}: probability {pose.probability:.2f}" for k, (words, pose) in enumerate(poses, 1)]
 
+    @property
+    def caveat(self) -> str:
+        """What is not determined, and a scale that is off; empty if there is nothing to be known."""
+        return "; ".join(filter(None, (part.words for part in (self.undetermined, self.scale) if part)))
+
+    def fit_lines(self, unit: str) -> list[str]:
+        """Lines of text on the scale and on free directions, if there are any."""
+        scale = [f"scale     {self.scale.words}"] if self.scale and self.scale.off else []
+        return scale + (self.undetermined.lines(unit) if self.undetermined else [])
+
     def lines(self, unit: str) -> list[str]:
         """Lines of text."""
         parts = f"{self.outliers:.0%} outliers, {self.missing:.0%} of the surface missing"
         observed = f"observed  noise of {in_decimals(self.noise)} {unit}, {parts}"
-        return [self.effects_line(unit), observed, *self.pose_lines("the object", unit)]
+        return [self.effects_line(unit), observed, *self.fit_lines(unit), *self.pose_lines("the object", unit)]
 
 
 @dataclass(frozen=True)
@@ -269,13 +290,26 @@ class Diagnosis:
         """``nominal``, ``failed`` or ``unknown``."""
         if self.void:
             return UNKNOWN
-        return NOMINAL if self.result < self.threshold else FAILED
+        return NOMINAL if self.result < self.threshold and not self.wrong_scale else FAILED
+
+    @property
+    def wrong_scale(self) -> bool:
+        """Whether the scale is off by more than the tolerance explains."""
+        scale = self.reenacted.scale
+        return scale is not None and scale.off and scale.error > self.tolerance
+
+    @property
+    def statement(self) -> str:
+        """The causes, or that nothing is wrong; and what to be aware of."""
+        if named := " and ".join(self.named):
+            return named
+        return f"nothing is wrong, but {caveat}" if (caveat := self.reenacted.caveat) else "nothing is wrong"
 
     @property
     def remark(self) -> str:
         """What to know of a result that is right."""
         if self.start < self.start_threshold:
-            return "nothing is wrong"
+            return self.statement
         return (
             "this result is right, but registrations from such starts often fail: start closer or search more broadly"
         )
@@ -285,6 +319,8 @@ class Diagnosis:
         """Causes more likely than not, likeliest first; at least one if the state is failed, otherwise none."""
         if self.state != FAILED:
             return ()
+        if self.wrong_scale:  # other causes show once it is right
+            return ("scale",)
         if self.start < self.start_threshold:  # the causes are those of bad starts, and only this pose is bad
             return ("pose",)
         first, *rest = sorted(self.causes, key=lambda cause: -self.causes[cause])
@@ -297,14 +333,14 @@ class Diagnosis:
 
     def as_dict(self) -> dict[str, object]:
         """Values for JSON."""
-        return asdict(self, dict_factory=plain) | {"state": self.state, "named": list(self.named)}
+        values = asdict(self, dict_factory=plain)
+        return values | {"state": self.state, "named": list(self.named), "caveat": self.reenacted.caveat}
 
     def lines(self, unit: str) -> list[str]:
         """Lines of text, with lengths in this unit."""
-        named = " and ".join(self.named) or "nothing is wrong"
         limit = f"{in_decimals(self.tolerance)} {unit} ({100 * self.tolerance_share:.2g} % of the diameter)"
         return [
-            f"state     {self.state}: {named}",
+            f"state     {self.state}: {self.statement}",
             f"result    probability {self.result:.2f} that the pose is off by more than {limit}",
             f"start     registrations from such starts fail with probability {self.start:.2f}",
             *(self.guarantee.lines() if self.guarantee else ["set       none, since nothing is promised"]),

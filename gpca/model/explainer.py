@@ -23,7 +23,7 @@ from gpca.classifier.scores import entropy
 from gpca.errors import InputError
 from gpca.model.clouds import Clouds, voids_of
 from gpca.model.diagnoser import QUICK_HYPOTHESES, QUICK_POINTS
-from gpca.model.diagnosis import CHECK, REFINE, RERUN, TAKE, Diagnosis
+from gpca.model.diagnosis import CHECK, REFINE, RERUN, RESCALE, TAKE, Diagnosis
 from gpca.model.explanation import GIVEN, Explanation, Motion, PoseSpread
 from gpca.model.file import Model
 from gpca.model.location import model_path
@@ -290,6 +290,8 @@ class Explainer:
 
     def _decided(self, diagnosis: Diagnosis, registered: bool) -> Decision:
         """Decide what to do about a wrong result: a better pose comes before the policy, unless that learns from it."""
+        if (scale := diagnosis.reenacted.scale) and diagnosis.wrong_scale:
+            return Decision(RESCALE, "", f"{scale.words}: multiply its points by {1 / scale.factor:.3g}")
         causes, bad_start = diagnosis.causes, diagnosis.start >= diagnosis.start_threshold
         decision = self.policy.decide(np.array([*causes.values()]), diagnosis.bald, concepts=(*causes,))
         if self.policy is not self.model.policy or (bad_start and decision.action == QUEUE):

@@ -297,11 +297,12 @@ class ScanExplanation(ExplainedRegistration):
         """Return what was found, as text."""
         limit = page.length(self.limit, self.unit)
         return [
-            f"state     {self.state}",
+            f"state     {self.state}" + (f", but {caveat}" if (caveat := self.reenacted.caveat) else ""),
             f"failure   probability {self.failure:.2f} of an error above {limit}",
             f"causes    {self._named()}",
             f"overlap   {self._overlap()}",
             self.reenacted.effects_line(self.unit),
+            *self.reenacted.fit_lines(self.unit),
             *self.reenacted.pose_lines("the source", self.unit),
             f"action    {self.advice} ({self.reason})",
         ]
@@ -329,6 +330,8 @@ class ScanExplanation(ExplainedRegistration):
             page.counterfactuals(scene, self.unit, SCANS_WITHOUT, "errors from this one start") if scene else "",
             page.details(explained, inputs, self.pose_rows(self.T_target_source)),
         ]
+        if caveat := self.reenacted.caveat:
+            doubt = f"{caveat[0].upper()}{caveat[1:]}. {doubt}"
         head = f'<h1 class="{tone}">{title}</h1><p>{escape(doubt)}</p>{page.warnings(self.warnings)}'
         return page.assembled("Scans explained", head, body, scene, self.unit)
 

@@ -85,7 +85,7 @@ def draw_explanation(explanation: Explanation, png_path: str | Path, names: str 
     elif diagnosis is None:
         lines = [f"leading concept: {explanation.concept}"]
     else:
-        lines = [f"{diagnosis.state}: {' and '.join(diagnosis.named) or 'nothing is wrong'}"]
+        lines = [f"{diagnosis.state}: {diagnosis.statement}"]
         tolerance = f"{in_decimals(diagnosis.tolerance)} {explanation.unit}"
         lines.append(f"off by more than {tolerance} with probability {diagnosis.result:.2f}")
         lines += [" ".join(line.split()) for line in (diagnosis.guarantee.lines() if diagnosis.guarantee else [])]

@@ -61,6 +61,8 @@ def headline(explained: Mapping) -> str:
     line = f'<h1 class="{TONES[state]}">{escape(title)}</h1>'
     if state == UNKNOWN:
         return line
+    if caveat := diagnosis["caveat"]:
+        line += f"<p>{sentence(caveat)}.</p>"
     tolerance, error = (length(diagnosis[name], explained["unit"]) for name in ("tolerance", "expected_error"))
     chance = f"The pose is off by more than {tolerance} with probability {diagnosis['result']:.2f}"
     called = f"called failed from {diagnosis['threshold']:.2f} on; expected error {error}"

@@ -152,7 +152,7 @@ def _reenacted(scans: Scans, enactments: Sequence[Enactment], T_found: np.ndarra
     weight_k = weights_of(enactment.hypothesis for enactment in enactments)
     reenacted = Reenacted.of(enactments, weight_k, T_found, scans.coarse)
     poses = (replace(pose, registered=pose.T_target_source is T_found) for pose in reenacted.poses)
-    return replace(reenacted, poses=tuple(poses))
+    return replace(reenacted, poses=tuple(poses)).with_fit(scans.few, T_found, scans.coarse, open_ends=True)
 
 
 def _prepared(

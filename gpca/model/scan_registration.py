@@ -240,9 +240,8 @@ class Scans:
         if not self.flat:  # features are those of surfaces
             by_features = [self.registered_by("fpfh_ransac", seed_of("scans", run)) for run in range(GLOBAL_RUNS)]
             T_n += [run.T_target_source for run in by_features if run.converged]
-        few = _drawn(self.source, SEARCH_POINTS, "source")
         random = generator("scans", "hypotheses")
-        T_n += [each.T for each in find_hypotheses(few, self.coarse, np.stack(T_n), ReenactmentSettings(), random)]
+        T_n += [each.T for each in find_hypotheses(self.few, self.coarse, np.stack(T_n), ReenactmentSettings(), random)]
         ends = [T_found, *self._icp.refine(self.source, np.stack(T_n))[0]]
         misfits = [self.misfit(T) for T in ends]
         distinct: list[PossiblePose] = []
@@ -288,6 +287,11 @@ class Scans:
     def flat(self) -> bool:
         """Whether either scan is flat, as those of 2-D lidars are."""
         return any(_axes(points)[1] <= FLAT for points in (self.source, self.target))
+
+    @cached_property
+    def few(self) -> np.ndarray:
+        """Some of the source's points."""
+        return _drawn(self.source, SEARCH_POINTS, "source")
 
     @cached_property
     def coarse(self) -> ModelSurface:
