@@ -21,7 +21,8 @@ class Registry(Generic[Entry]):
     kind: str  # name of an entry in messages
     folder: str  # package of the modules that list entries
     variable: str  # of a module, its entries by name
-    first: Sequence[str] = ()  # modules elsewhere, whose entries come first
+    first: Sequence[str] = ()  # modules elsewhere, whose entries come first,
+    last: Sequence[str] = ()  # or after those of the folder
     outside: type[Entry] | None = None  # type of the entries of plugins, which come last; None for no plugins
 
     def entries(self) -> dict[str, Entry]:
@@ -43,7 +44,8 @@ class Registry(Generic[Entry]):
         """Return the entries of each module."""
         files = {file for folder in import_module(self.folder).__path__ for file in os.listdir(folder)}
         names = sorted(f"{self.folder}.{file[:-3]}" for file in files if file.endswith(".py") and file != "__init__.py")
-        by_module = {name: getattr(import_module(name), self.variable, {}) for name in (*self.first, *names)}
+        modules = (*self.first, *names, *self.last)
+        by_module = {module: getattr(import_module(module), self.variable, {}) for module in modules}
         if self.outside is None:
             return by_module
         taken = [name for entries in by_module.values() for name in entries]

@@ -41,6 +41,7 @@ from gpca.rigid import inverse, rigid_motion, scale_translation, transform
 from gpca.seeds import generator
 from gpca.settings import Bounds, Positive, PositiveShare
 
+JUDGED = 24  # ends of the least cost, whose likelihoods are compared
 TURNS = 96  # starts at turns of any size, where there is no initial pose
 
 
@@ -107,7 +108,7 @@ def align_from_many(
     """Run ICP from the starts of the search on `points` of the source, at first within `wide_distance`.
 
     The result, at last on all points, is the end of the least mean square over the smallest distances, the share
-    `overlap` of all, or the likeliest under the mixture whose width and share of outliers are fitted at each end.
+    `overlap` of all, or of the best of these the likeliest under the mixture, whose width and outliers are fitted.
     """
     frame = Frame(pair, pair.T_target_source_init, unit)
     kept = generator("registration", "many starts", pair.seed).permutation(len(frame.source))[:points]
@@ -116,14 +117,15 @@ def align_from_many(
         icp = BatchedICP(frame.target, ICPSettings("point_to_point", distance / unit, max_iterations))
         ends_n = icp.register(few, ends_n)[0]
         ends_n = ends_n[first_of_alike(ends_n)]
+    tree, counted = cKDTree(frame.target), max(FEWEST, round(overlap * len(few)))
+    distance_n_N = np.sort([tree.query(transform(T, few))[0] for T in ends_n], axis=1)
+    order_n = np.argsort(np.square(distance_n_N[:, :counted]).mean(axis=1), kind="stable")
     if by_likelihood:
+        order_n = order_n[:JUDGED]
         mixture = Mixture(frame.target, ModelSurface(frame.target).spacing / 2)
-        fit_n = mixture.fit(few, ends_n, LAST_ITERATIONS, moving=False).log_likelihood_n
-    else:
-        tree, counted = cKDTree(frame.target), max(FEWEST, round(overlap * len(few)))
-        distance_n_N = np.sort([tree.query(transform(T, few))[0] for T in ends_n], axis=1)
-        fit_n = -np.square(distance_n_N[:, :counted]).mean(axis=1)
-    best = frame.pose(ends_n[np.argmax(fit_n)])
+        fits = mixture.fit(few, ends_n[order_n], LAST_ITERATIONS, moving=False)
+        order_n = order_n[np.argsort(-fits.log_likelihood_n, kind="stable")]
+    best = frame.pose(ends_n[order_n[0]])
     return align_compiled(pair.started_at(best), correspondence_distance, max_iterations)
 
 
