@@ -65,13 +65,6 @@ def covariance_columns(covariance_6_6: np.ndarray | None) -> dict[str, float]:
     return dict(zip(COVARIANCE, values.tolist(), strict=True))
 
 
-def covariance_of(row: pd.Series) -> np.ndarray:
-    """Σ (6, 6) of a row, in radians and diameters."""
-    upper_6_6 = np.zeros((6, 6))
-    upper_6_6[SIXTH] = row[list(COVARIANCE)].to_numpy(dtype=float) / MILLI**2
-    return upper_6_6 + np.triu(upper_6_6, 1).T
-
-
 def read_estimates(path: str | Path) -> pd.DataFrame:
     """Read a file of the step ``estimate``: `failed` as booleans, numbers as numbers, NaN where an estimate failed."""
     rows = read_csv(path, (*KNOWN, *JUDGED, *COVARIANCE))
@@ -104,7 +97,3 @@ class ReferenceSamples(Container):
     twists: np.ndarray = array("N 6", offsets="offsets", fewest=0)
     offsets: np.ndarray = array("S+1", WHOLE)
     true_twist: np.ndarray = array("S 6")
-
-    def twists_of(self, i: int) -> np.ndarray:
-        """Twists (N, 6) of a row."""
-        return self.part("twists", i).astype(np.float64)

@@ -9,19 +9,13 @@ from gpca.errors import InputError
 from gpca.experiments.estimator_figure import (
     LEVELS,
     STYLES,
-    WIDEST,
     coverages,
-    draw_ellipses,
     draw_estimators,
-    ellipse,
 )
 from gpca.io.csv_file import write_csv
-from gpca.reporting.figures.style import GRAY
 from gpca.uncertainty.estimates import (
     JUDGED,
-    KINDS,
     REFERENCES,
-    ReferenceSamples,
     covariance_columns,
     read_estimate_files,
 )
@@ -33,13 +27,12 @@ ESTIMATORS = ("censi", "brossard")
 RUN = run_with(
     estimators=dict.fromkeys(ESTIMATORS),
     estimator_pairs={"methods": {"point_to_point": 8}},
-    figures={"source": "cups"},
+    sources={"cups": {"title": "Cups", "kind": "procedural"}},
 )
 
 
 @pytest.fixture
 def files(tmp_path):
-    random = np.random.default_rng(0)
     frame = pd.DataFrame(
         {
             "sample": np.arange(8), "object": "cup", "method": "point_to_point", "failed": np.arange(8) > 3,
@@ -54,42 +47,28 @@ def files(tmp_path):
         path.parent.mkdir(parents=True)
         write_csv(path, frame)
         paths.append(path)
-    samples = ReferenceSamples(
-        np.repeat(np.arange(8), 3), np.full(24, "point_to_point"), np.tile(KINDS, 8),
-        0.03 * random.normal(size=(720, 6)), np.arange(0, 721, 30), 0.01 * np.ones((24, 6)),
-    )  # fmt: skip
-    (tmp_path / "samples" / "cups").mkdir(parents=True)
-    samples.save(tmp_path / "samples/cups/seed0.npz", ("cups", 0))
-    return paths, tmp_path / "samples/cups/seed0.npz"
+    return paths
 
 
-def drawn(paths, samples):
-    return draw_estimators(RUN, read_estimate_files(paths), samples)
+def drawn(paths):
+    return draw_estimators(RUN, read_estimate_files(paths))
 
 
 def test_the_figure_is_the_same_bytes_each_time(files, same_bytes):
-    same_bytes(lambda: drawn(*files))
+    same_bytes(lambda: drawn(files))
 
 
-def test_samples_without_their_estimates_are_refused(files):
-    paths, samples = files
-    with pytest.raises(InputError, match="has no estimates of cups, seed 0"):
-        drawn(paths[1:], samples)
+def test_estimates_that_are_missing_are_refused(files):
+    with pytest.raises(InputError, match="are none of reference_starts"):
+        drawn(files[1:])
 
 
-def test_the_references_are_seen_above_and_the_axes_are_named(files):
-    figure = drawn(*files)
-    titles = RUN.titles(estimator_entry, ESTIMATORS).values()
-    names = [text.get_text() for text in figure.subfigs[0].legends[0].get_texts()]
+def test_every_estimator_is_named_and_so_are_the_sides_of_the_diagonals(files):
+    figure = drawn(files)
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
     references = ["Other starts", "Other data", "Other starts and data"]
-    assert names[:5] == [*references, *titles]
-    assert names[5:] == ["results of other starts and data", "true pose", "succeeded", "failed"]
-    upper = figure.axes[:4]
-    assert [panel.get_ylabel() for panel in upper] == [
-        f"second axis ({unit})" for unit in ("degrees", "% of the diameter") * 2
-    ]
-    assert all(GRAY in [line.get_color() for line in panel.get_lines()] for panel in upper)
-    sides = {panel.get_title(): [text.get_text() for text in panel.texts] for panel in figure.axes[4:]}
+    assert names == [*references, *RUN.titles(estimator_entry, ESTIMATORS).values(), "succeeded", "failed"]
+    sides = {panel.get_title(): [text.get_text() for text in panel.texts] for panel in figure.axes}
     assert sides["Other starts and data"] == ["too confident", "too cautious"]  # above the diagonal, and below
     assert sides["Coverage, succeeded"] == ["too cautious"]  # above it
 
@@ -100,31 +79,6 @@ def test_estimators_of_one_color_differ_in_their_line():
     assert STYLES["bayesian_icp"][0] != STYLES["stein_icp"][0]
 
 
-@pytest.mark.parametrize(("times", "whole"), [(1.5, True), (10.0, False)])
-def test_an_ellipse_is_drawn_whole_or_named_where_it_is_far_wider(times, whole):
-    import matplotlib.pyplot as plt
-
-    random = np.random.default_rng(0)
-    twists = random.normal(size=(400, 6))
-    samples = ReferenceSamples(
-        np.array([0]), np.array(["icp"]), np.array(["all"]), twists, np.array([0, 400]), np.zeros((1, 6))
-    )
-    deviation = times * 2.6 / np.sqrt(-2 * np.log(0.05))  # of an ellipse that is so many times as wide as the dots
-    row = pd.Series(covariance_columns(deviation**2 * np.eye(6)))
-    figure, panel = plt.subplots()
-    left_out = draw_ellipses(panel, samples, 0, {"own": row, "censi": None}, slice(0, 3), 1.0)
-    assert left_out == ([] if whole else ["own"])
-    *outlines, _ = panel.get_lines()
-    edge = panel.get_xlim()[1]
-    assert [np.abs(outline.get_xydata()).max() < edge for outline in outlines] == [True] * whole
-    assert edge < 1.1 * WIDEST * 3.0
-    plt.close(figure)
-
-
-def test_an_ellipse_holds_what_it_says_and_a_right_covariance_lies_on_the_diagonal():
-    sigma = np.array([[2.0, 0.6], [0.6, 0.5]])
-    outline = ellipse(sigma)
-    distance = np.einsum("ni,ij,nj->n", outline, np.linalg.inv(sigma), outline)
-    assert distance == pytest.approx(np.full(len(outline), chi2.ppf(0.95, 2)))
+def test_a_right_covariance_lies_on_the_diagonal():
     squares = np.random.default_rng(0).chisquare(6, size=20_000)
     assert coverages(squares) == pytest.approx(LEVELS, abs=0.015)

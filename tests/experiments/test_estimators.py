@@ -15,10 +15,10 @@ from gpca.uncertainty.estimates import (
     REFERENCES,
     ReferenceSamples,
     covariance_columns,
-    covariance_of,
     read_estimates,
 )
 
+from ..steps.test_estimates import covariance_of
 from .runs import run_with
 
 RUN = run_with()
@@ -205,5 +205,5 @@ def test_samples_survive_the_file(tmp_path):
     )  # fmt: skip
     samples.save(tmp_path / "a.npz", ("cups", 0))
     loaded = ReferenceSamples.load(tmp_path / "a.npz")
-    assert loaded.twists_of(1).shape == (2, 6)
+    assert loaded.part("twists", 1).shape == (2, 6)
     assert loaded.kind.tolist() == ["data", "all"]

@@ -21,7 +21,7 @@ from gpca.steps.estimates import (
     try_estimators,
 )
 from gpca.steps.references import Reference
-from gpca.uncertainty.estimates import COVARIANCE, KINDS, REFERENCES, EstimatorPairSettings, covariance_of
+from gpca.uncertainty.estimates import COVARIANCE, KINDS, MILLI, REFERENCES, SIXTH, EstimatorPairSettings
 from gpca.uncertainty.spread import divergence
 from tests.conftest import FEW_CAUSES
 
@@ -100,6 +100,12 @@ def test_without_another_source_there_are_no_lessons_of_one(situations):
         situations, None, {"cello": {"steps": 2}}, replace(SETTINGS, methods={"point_to_point": 1})
     )
     assert list(rows) == [*REFERENCES, "cello", "cello_mild"]
+
+
+def covariance_of(row):
+    upper_6_6 = np.zeros((6, 6))
+    upper_6_6[SIXTH] = row[list(COVARIANCE)].to_numpy(float) / MILLI**2
+    return upper_6_6 + np.triu(upper_6_6, 1).T
 
 
 def test_a_reference_is_the_covariance_of_its_results_and_does_not_diverge_from_itself(tried):
@@ -190,7 +196,7 @@ def test_the_results_of_every_reference_are_kept(tried):
     assert samples.kind.tolist() == [*KINDS] * len(cases)
     for i in range(len(samples.kind)):
         expected = cases[i // len(KINDS)].references[KINDS[i % len(KINDS)]].twists
-        assert samples.twists_of(i) == pytest.approx(expected, abs=1e-6)
+        assert samples.part("twists", i) == pytest.approx(expected, abs=1e-6)
 
 
 def test_objects_that_are_not_the_registrations_are_refused(situations, objects):
