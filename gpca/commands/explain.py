@@ -58,7 +58,7 @@ def add_registration_arguments(parser: ArgumentParser, given_pose: str) -> None:
     add = parser.add_argument
     add("source", type=Path, nargs="+", help=f"observed cloud or mesh ({FORMATS})")
     add("target", type=Path, help="reference to which each source is aligned")
-    pairs = "CSV with the columns source, target and perhaps init, unit and source_unit, in place of both"
+    pairs = "CSV with the columns source, target and perhaps init or pose, unit, source_unit, in place of both"
     add("--pairs", type=Path, metavar="FILE", action=_InsteadOfClouds, help=pairs)
     add("--init", type=Path, help="file with the initial pose T_target_source: 4×4, 3×4 or TUM, text or npy")
     add("--pose", type=Path, help=f"such a file with a pose that is {given_pose}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 from argparse import Namespace
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -19,10 +19,10 @@ from gpca.objects.canonical import CanonicalFrame
 from gpca.objects.sizes import AS_OPTIONS, extent, require_sizes
 from gpca.objects.surface import METERS_PER_UNIT, measured
 
-COLUMNS = ("source", "target")  # of a CSV of pairs; optional ones are init, unit and source_unit
-FILES = (*COLUMNS, "init")
+COLUMNS = ("source", "target")  # of a CSV of pairs; optional ones are init or pose, unit and source_unit
+FILES = (*COLUMNS, "init", "pose")
 TargetReader = Callable[[Path], tuple[np.ndarray, CanonicalFrame | None]]
-PAIRS_REMEDY = "give the columns source and target, and perhaps init, unit and source_unit"
+PAIRS_REMEDY = "give the columns source and target, and perhaps init or pose, unit and source_unit"
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,7 @@ class Inputs:
     start: Path | None  # pose from which to register, or to judge
     unit: str  # of the target, the pose and the results
     source_unit: str | None  # None: the same
+    judged: bool = False  # whether the pose is judged as it is
 
     def require_formats(self) -> None:
         """Raise an InputError for a cloud that is missing or of another format, before anything is read."""
@@ -53,6 +54,8 @@ class Inputs:
             units = self.source_unit or self.unit, self.unit
             require_sizes((self.source, self.target), extents, frame.diameter, units, AS_OPTIONS)
             given["frame"] = frame
+        if self.judged:
+            given |= {"T_target_source": T_init} if frame is None else {"register": False}
         return given | {"target_points": target}
 
 
@@ -68,14 +71,14 @@ def from_words(options: Namespace) -> list[Inputs]:
     return [Inputs(source, options.target, start, *units) for source in options.source]
 
 
-def from_rows(options: Namespace) -> list[tuple[str, dict[str, str]]]:
+def from_rows(options: Namespace, columns: Sequence[str] = COLUMNS) -> list[tuple[str, dict[str, str]]]:
     """Return the rows of a CSV of pairs, each with its place; InputError if it has none or lacks a column."""
     path = options.pairs
     require_file(path, "no such file", PAIRS_REMEDY)
     with refusing(path, "is not a readable CSV file ({})", PAIRS_REMEDY), path.open(encoding="utf-8-sig") as file:
         table = csv.DictReader(file, skipinitialspace=True)
         rows = [(f"{path}, line {table.line_num}", row) for row in table]
-    if missing := [column for column in COLUMNS if column not in (table.fieldnames or ())]:
+    if missing := [column for column in columns if column not in (table.fieldnames or ())]:
         raise InputError(path, f"column '{missing[0]}' is missing", PAIRS_REMEDY)
     if not rows:
         raise InputError(path, "has no rows", PAIRS_REMEDY)
@@ -95,5 +98,7 @@ def inputs_in(row: dict[str, str], options: Namespace) -> Inputs:
         require_known("unit", unit, METERS_PER_UNIT)
     folder = options.pairs.parent
     source, target = (folder / entries[name] for name in COLUMNS)
-    start = folder / entries["init"] if entries["init"] else None
-    return Inputs(source, target, start, units[0], units[1])
+    if entries["pose"] and (entries["init"] or options.method):
+        raise InputError("pose", "is judged as it is, without init or --method", "leave one of them out")
+    start = entries["pose"] or entries["init"]
+    return Inputs(source, target, folder / start if start else None, units[0], units[1], bool(entries["pose"]))

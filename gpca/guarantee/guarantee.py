@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 
 from gpca.causes.dataset import LABELS, labels_of
-from gpca.causes.truth import BORDERLINE, NOMINAL, Truth
+from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL, Truth
 from gpca.errors import InputError
 from gpca.evaluation import conformal
 from gpca.evaluation.conformal import FailureAlarm, Nonconformity, StateSets
 
 SEVERAL = "several"
 STATES = (*LABELS, SEVERAL)
+WHETHER_FAILED = (NOMINAL, FAILED)  # states of samples whose causes are not known
 BOUNDS = {"good_below": -inf, "failed_from": inf}  # of an alarm; the values stand as None in files
 REMEDY = "calibrate it again"
 
@@ -29,17 +30,26 @@ class Guarantee:
     failure_alarm: FailureAlarm
     samples: int
     families: int  # number of families it was calibrated on; 0 if samples were exchangeable one by one
+    labeled: bool = False  # whether a user labeled the samples
 
     def sets(self, scores_M_K: np.ndarray) -> np.ndarray:
-        """Return which states (M, K) are in the set of each of M registrations, by their scores."""
+        """Return which states (M, K) are in the set of each of M registrations, by scores of these or of `STATES`."""
+        if self.state_sets.states == WHETHER_FAILED:
+            scores_M_K = whether_failed(scores_M_K)
         return self.state_sets.of(scores_M_K)
 
     def alarm(self, failure_M: np.ndarray) -> np.ndarray:
         """Return the call of each registration (M,), one of :data:`gpca.evaluation.conformal.OUTCOMES`."""
         return self.failure_alarm.of(failure_M)
 
-    def more_cautious(self, other: Guarantee) -> Guarantee:
-        """Return the larger sets and the rarer calls of two guarantees of the same states."""
+    def within(self, threshold: float) -> float:
+        """Return the threshold of failure nearest to this one at which no state contradicts a call of the alarm."""
+        return min(max(threshold, self.failure_alarm.good_below), self.failure_alarm.failed_from)
+
+    def more_cautious(self, other: Guarantee) -> Guarantee | None:
+        """Return the larger sets and the rarer calls of two guarantees; None if they are of different states."""
+        if self.state_sets.states != other.state_sets.states:
+            return None
         one, two = self.failure_alarm, other.failure_alarm
         limits = tuple(map(max, self.state_sets.limits, other.state_sets.limits))
         bounds = {
@@ -53,7 +63,8 @@ class Guarantee:
         sets, alarm = asdict(self.state_sets), asdict(self.failure_alarm)
         sets |= {"states": list(sets["states"]), "limits": [x if isfinite(x) else None for x in sets["limits"]]}
         alarm |= {name: alarm[name] if isfinite(alarm[name]) else None for name in BOUNDS}
-        return {"sets": sets, "alarm": alarm, "samples": self.samples, "families": self.families}
+        counts = {"samples": self.samples, "families": self.families, "labeled": self.labeled}
+        return {"sets": sets, "alarm": alarm, **counts}
 
     @classmethod
     def from_dict(cls, plain: Mapping[str, Any]) -> Guarantee:
@@ -63,7 +74,8 @@ class Guarantee:
             limits = tuple(inf if x is None else float(x) for x in sets["limits"])
             bounds = {name: none if alarm[name] is None else float(alarm[name]) for name, none in BOUNDS.items()}
             state_sets = StateSets(**{**sets, "states": tuple(sets["states"]), "limits": limits})
-            read = cls(state_sets, FailureAlarm(**{**alarm, **bounds}), int(plain["samples"]), int(plain["families"]))
+            counts = int(plain["samples"]), int(plain["families"]), bool(plain.get("labeled"))
+            read = cls(state_sets, FailureAlarm(**{**alarm, **bounds}), *counts)
         except (KeyError, TypeError, ValueError) as fault:
             raise InputError("guarantee", f"is damaged ({type(fault).__name__}: {fault})", REMEDY) from fault
         if len(limits) != len(state_sets.states):
@@ -108,6 +120,11 @@ def calibrate(
     failed_n = state_n != states[0]
     alarm = conformal.calibrate_alarm(1 - scores_n_K[:, 0], failed_n, family_n, missed, false_alarms, confidence)
     return Guarantee(sets, alarm, len(state_n), 0 if family_n is None else len(np.unique(family_n)))
+
+
+def whether_failed(scores_M_K: np.ndarray) -> np.ndarray:
+    """Return scores (M, 2) of `WHETHER_FAILED`, from those of states of which the first is nominal."""
+    return np.column_stack([scores_M_K[:, 0], 1 - scores_M_K[:, 0]])
 
 
 def states_of(truth: Truth) -> np.ndarray:

@@ -105,7 +105,7 @@ class Diagnoser:
         inputs_1_F = self.classifier.normalized(features_F[None])
         judged = self.classifier.judge(inputs_1_F)
         result_1, level = self.judge.probability(evidence, tolerance), calibrated_at(self.levels, tolerance)
-        scores_1_5, guarantee = state_probabilities(judged, result_1), level.guarantee
+        scores_1_5, guarantee = state_probabilities(judged.causes_N_3, result_1), level.guarantee
         diagnosis = Diagnosis(
             result=float(result_1[0]),
             threshold=level.threshold,
@@ -318,14 +318,14 @@ def calibrated(
     it is calibrated on single samples, and holds as far as registrations of a new family are like the others.
     """
     state_N = training.states_within(tolerance)
-    threshold = threshold_of(result_N[state_N == NOMINAL], false_alarms)
-    scores_N_5 = state_probabilities(judged, result_N)
+    scores_N_5 = state_probabilities(judged.causes_N_3, result_N)
     family_N = training.family_N if highest_level(training.family_N) >= LEVEL else None
     by_family, single = (
         calibrate(scores_N_5, state_N, families, level=LEVEL, missed=MISSED, false_alarms=false_alarms)
         for families in (family_N, None)
     )
     guarantee = Guarantee(by_family.state_sets, single.failure_alarm, by_family.samples, by_family.families)
+    threshold = guarantee.within(threshold_of(result_N[state_N == NOMINAL], false_alarms))
     off_N = training.shown_error_N > tolerance
     held_out = alarms(off_N, result_N, threshold, training.family_N)
     return Calibrated(tolerance, threshold, guarantee, held_out=held_out)

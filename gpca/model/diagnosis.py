@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 
 from gpca.causes.policy import NOTHING, QUEUE
 from gpca.causes.truth import ALL, FAILED, NOMINAL, shapley_values
-from gpca.evaluation.conformal import ALARM, GOOD
+from gpca.evaluation.conformal import ALARM, GOOD, NOT_SURE
 from gpca.guarantee.guarantee import SEVERAL, Guarantee
 from gpca.model.undetermined import Undetermined, axis_in_words, undetermined_at
 from gpca.numerals import in_decimals
@@ -23,9 +23,6 @@ from gpca.reenactment.scale import Scale, find_scale
 from gpca.reenactment.surface import ModelSurface
 from gpca.rigid import inverse, log, transform
 from gpca.seeds import generator
-
-if TYPE_CHECKING:
-    from gpca.explainers.pair_classifier import Judgment
 
 UNKNOWN = "unknown"  # state of a pair whose scores mean nothing
 LIKELY = 0.5  # probability from which a concept is named as a cause
@@ -68,6 +65,8 @@ class Guaranteed:
     missed: float  # largest probability that a failure is called good
     false_alarms: float  # largest probability that a good registration is called failed
     families: int  # number of families of shapes used for calibration; 0 if samples were exchangeable one by one
+    samples: int  # number of registrations used for calibration
+    labeled: bool  # whether a user labeled these, in groups as families
 
     @classmethod
     def of(cls, guarantee: Guarantee, scores_1_K: np.ndarray) -> Guaranteed:
@@ -80,27 +79,38 @@ class Guaranteed:
             missed=alarm.missed,
             false_alarms=alarm.false_alarms,
             families=guarantee.families,
+            samples=guarantee.samples,
+            labeled=guarantee.labeled,
         )
 
     def lines(self) -> list[str]:
-        """Two lines of text."""
+        """Return lines of text."""
         states = " or ".join(IN_WORDS.get(state, state) for state in self.states)
         risk = {
             GOOD: f"at most {self.missed:.0%} of the failures are called so",
             ALARM: f"at most {self.false_alarms:.0%} of the good ones are called so",
         }
         why = risk.get(self.call, "neither call keeps its promise here")
-        return [f"set       {states} ({self.level:.0%} of such sets hold the truth)", f"alarm     {self.call} ({why})"]
+        lines = [f"set       {states} ({self.level:.0%} of such sets hold the truth)", f"alarm     {self.call} ({why})"]
+        return [*lines, f"promise   {self.basis}"] if self.labeled else lines
+
+    @property
+    def basis(self) -> str:
+        """The labeled registrations that the promise holds for, in words."""
+        groups = f"of {self.families} groups, for a new group" if self.families else "for others like these"
+        return f"by {self.samples} labeled registrations {groups}"
 
 
-def state_probabilities(judged: Judgment, result_N: np.ndarray) -> np.ndarray:
-    """Return probabilities (N, 5) of :data:`gpca.guarantee.guarantee.STATES` that sum to 1, for failed results' (N,).
+def state_probabilities(causes_N_3: np.ndarray, result_N: np.ndarray) -> np.ndarray:
+    """Return probabilities (N, 5) of :data:`gpca.guarantee.guarantee.STATES` that sum to 1, by those of each cause.
+
+    `result_N` are the probabilities of failed results.
 
     Causes are assumed to be independent, given a failure. The probability that a failure has no cause is distributed
     over the causes in proportion to their probabilities, since a failure without a cause above the limit is labeled by
     its dominant cause.
     """
-    causes_N_3 = np.clip(judged.causes_N_3, SMALLEST, 1)
+    causes_N_3 = np.clip(causes_N_3, SMALLEST, 1)
     rest_N_3 = 1 - causes_N_3
     others_N_3 = np.stack([np.delete(rest_N_3, c, axis=1).prod(axis=1) for c in range(rest_N_3.shape[1])], axis=1)
     alone_N_3, none_N_1 = causes_N_3 * others_N_3, rest_N_3.prod(axis=1, keepdims=True)
@@ -306,6 +316,12 @@ class Diagnosis:
         return f"nothing is wrong, but {caveat}" if (caveat := self.reenacted.caveat) else "nothing is wrong"
 
     @property
+    def doubtful(self) -> bool:
+        """Whether the alarm is not sure, so that no promise holds for the state."""
+        guarantee = None if self.void or self.wrong_scale else self.guarantee
+        return guarantee is not None and guarantee.call == NOT_SURE
+
+    @property
     def remark(self) -> str:
         """What to know of a result that is right."""
         if self.start < self.start_threshold:
@@ -340,7 +356,7 @@ class Diagnosis:
         """Lines of text, with lengths in this unit."""
         limit = f"{in_decimals(self.tolerance)} {unit} ({100 * self.tolerance_share:.2g} % of the diameter)"
         return [
-            f"state     {self.state}: {self.statement}",
+            f"state     {'probably ' * self.doubtful}{self.state}: {self.statement}",
             f"result    probability {self.result:.2f} that the pose is off by more than {limit}",
             f"start     registrations from such starts fail with probability {self.start:.2f}",
             *(self.guarantee.lines() if self.guarantee else ["set       none, since nothing is promised"]),

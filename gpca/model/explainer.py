@@ -5,7 +5,7 @@ ICP is the compiled loop, not Open3D's as for those samples (docs/protocol.md#tw
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -235,6 +235,22 @@ class Explainer:
     ) -> Explanation:
         """Explain a given pose (4, 4) without registering: is it right? `options` are those of :meth:`explain`."""
         return self.explain(source_points, target_points, T_target_source, **options, register=False)
+
+    def calibrated(
+        self, explanations: Sequence[Explanation], labels: Sequence[str], groups: Sequence[str] | None = None
+    ) -> Explainer:
+        """Return an explainer whose alarm, sets and threshold are set on registrations that you have labeled.
+
+        Args:
+            explanations: by this explainer, all with the tolerance that the labels are for.
+            labels: ``right`` or ``wrong``, or in place of ``wrong`` its cause: noise, pose, overlap or several.
+            groups: names of families or scenes, if the promise is to hold for new ones.
+        """
+        from gpca.model.calibration import LabeledRegistrations
+
+        labeled = LabeledRegistrations.of([explanation.diagnosis for explanation in explanations], labels, groups)
+        model = replace(self.model, diagnoser=labeled.set_in(self.model.diagnoser))
+        return Explainer(model, self.policy, self._device)
 
     def explain_many(
         self,

@@ -27,7 +27,7 @@ from gpca.errors import InputError
 from gpca.evaluation.conformal import Nonconformity
 from gpca.explainers.classifiers import require_trees
 from gpca.explainers.pair_classifier import ABSENT, PRESENT
-from gpca.guarantee.guarantee import STATES, Guarantee
+from gpca.guarantee.guarantee import STATES, WHETHER_FAILED, Guarantee
 from gpca.io.array_tree import TEXT, read_tree, write_tree
 from gpca.model import torch_file
 from gpca.model.clouds import MEASURES, Familiarity
@@ -74,7 +74,10 @@ class Model:
         """The training data, in words."""
         paper = f"{self.title} (procedural stand-in)" if self.stand_in else self.title
         objects = ", ".join(self.learned_from) or "objects that the model file does not name"
-        return f"the diagnosis learned from {objects}; GP-CA as in the paper from {paper}"
+        learned = f"the diagnosis learned from {objects}; GP-CA as in the paper from {paper}"
+        by = [level.guarantee for level in self.diagnoser.levels if level.guarantee and level.guarantee.labeled]
+        counts = " and ".join(dict.fromkeys(f"{guarantee.samples}" for guarantee in by))
+        return f"{learned}; limits are set on {counts} labeled registrations" if by else learned
 
     def save(self, path: str | Path) -> None:
         """Write the file; equal models give equal bytes."""
@@ -224,7 +227,11 @@ def _require_diagnoser(state: Mapping) -> None:
     for level in levels:
         if level["guarantee"] is not None:
             sets = Guarantee.from_dict(level["guarantee"]).state_sets
-            same = sets.states == STATES and 0 < sets.level < 1 and sets.nonconformity in get_args(Nonconformity)
+            same = (
+                sets.states in (STATES, WHETHER_FAILED)
+                and 0 < sets.level < 1
+                and sets.nonconformity in get_args(Nonconformity)
+            )
             _require(same, "its guarantee is of different states, or of none")
     measures = [state["held_out"], *(level.get("held_out", {}) for level in levels)]
     for name, value in (item for each in measures for item in each.items()):

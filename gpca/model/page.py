@@ -12,9 +12,9 @@ from math import sqrt
 from string import Template
 
 from gpca.causes.policy import NOTHING
-from gpca.causes.truth import BY_SIZE
-from gpca.evaluation.conformal import ALARM, GOOD
-from gpca.guarantee.guarantee import STATES
+from gpca.causes.truth import BY_SIZE, FAILED
+from gpca.evaluation.conformal import ALARM, GOOD, NOT_SURE
+from gpca.guarantee.guarantee import STATES, WHETHER_FAILED
 from gpca.model.diagnosis import IN_WORDS, UNKNOWN, Diagnosis, Guaranteed, Reenacted
 from gpca.model.scene import ASSETS, WITHOUT, Scene, taken_out
 from gpca.numerals import in_decimals
@@ -53,9 +53,10 @@ def headline(explained: Mapping) -> str:
     if (diagnosis := explained["diagnosis"]) is None:
         return f"<h1>The leading concept is {escape(explained['concept'])}</h1>"
     state = diagnosis["state"]
+    probably = "probably " * ((diagnosis["guarantee"] or {}).get("call") == NOT_SURE)
     title = {
-        "nominal": "This registration succeeded",
-        "failed": f"This registration failed: {' and '.join(diagnosis['named'])}",
+        "nominal": f"This registration {probably}succeeded",
+        "failed": f"This registration {probably}failed: {' and '.join(diagnosis['named'])}",
         UNKNOWN: "The state of this registration is unknown",
     }[state]
     line = f'<h1 class="{TONES[state]}">{escape(title)}</h1>'
@@ -91,10 +92,12 @@ def promise(guarantee: Guaranteed | None) -> str:
         return section("What is guaranteed", "<p>Nothing: a fast explanation, or a model without a guarantee.</p>")
     chips = "".join(
         f'<li class="{"in" if state in guarantee.states else "out"}">{escape(IN_WORDS.get(state, state))}</li>'
-        for state in STATES
+        for state in (WHETHER_FAILED if FAILED in guarantee.states else STATES)
     )
     counted = (
-        f"It was calibrated on {guarantee.families} families of shapes that the classifier had not learned, and "
+        f"It was calibrated {guarantee.basis}."
+        if guarantee.labeled
+        else f"It was calibrated on {guarantee.families} families of shapes that the classifier had not learned, and "
         "holds for objects that are to those of the training as these are to one another."
         if guarantee.families
         else "It was calibrated on single registrations of objects that the classifier had not learned."

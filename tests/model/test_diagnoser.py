@@ -176,7 +176,7 @@ def test_what_is_promised_and_measured_is_of_families_that_were_not_learned(lear
     judged, result_T_N = judged_unseen(given, SETTINGS, "tiny", 0)
     for level, result_N in zip(full.levels, result_T_N, strict=True):
         assert (level.guarantee.families, level.guarantee.samples) == (0, 60)
-        inside = level.guarantee.sets(state_probabilities(judged, result_N))
+        inside = level.guarantee.sets(state_probabilities(judged.causes_N_3, result_N))
         state_N = given.states_within(level.tolerance)
         own = [level.guarantee.state_sets.states.index(state) for state in state_N]
         assert inside[np.arange(60), own].mean() >= 0.9
@@ -223,7 +223,7 @@ def test_each_registration_is_judged_by_what_learned_no_other_of_its_family(monk
 def test_states_of_a_failure_are_as_probable_as_its_causes():
     causes_N_3 = np.array([[0.5, 0.5, 0.5], [1, 0, 0], [1, 1, 0], [0, 0, 0]])
     judged = Judgment(np.array([0.0, 1.0, 0.5, 1.0]), causes_N_3, np.zeros((4, 3)), np.zeros(4))
-    scores = state_probabilities(judged, judged.failure_N)
+    scores = state_probabilities(judged.causes_N_3, judged.failure_N)
     expected = [[1, 0, 0, 0, 0], [0, 1, 0, 0, 0], [0.5, 0, 0, 0, 0.5], [0, 1 / 3, 1 / 3, 1 / 3, 0]]
     np.testing.assert_allclose(scores, expected, atol=1e-6)
     np.testing.assert_allclose(scores.sum(axis=1), 1)

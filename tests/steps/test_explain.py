@@ -13,7 +13,7 @@ from tests.steps.by_words import main
 
 from ..documents import ROOT
 from .command_lines import arguments
-from .spoiling import refused, removed, truncated, untouched, written
+from .spoiling import content, refused, removed, truncated, untouched, written
 
 FAULTS = [
     (removed("model.pt"), {}, r"model.pt: no such model; make one with 'make results'"),
@@ -268,3 +268,39 @@ def test_page_and_figure_are_written_beside_the_text(folder, capsys):
     assert "<dt>Source</dt><dd>meshes/brick.stl</dd>" in page
     assert "T_target_source" in page
     assert (folder / "figure.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_limits_are_set_on_labeled_pairs_and_a_pose_of_a_row_is_judged_as_it_is(folder, capsys):
+    poses = [f"1 0 0 {shift}  0 1 0 0  0 0 1 0" for shift in range(4)]
+    rows = ["source,target,pose,init,label,group"]
+    for number, (text, label) in enumerate(zip(poses, ("right", "noise", "right", "several"), strict=True)):
+        (folder / f"{number}.txt").write_text(text)
+        column = f"{number}.txt," if number % 2 else f",{number}.txt"
+        rows.append(f"meshes/brick.stl,meshes/cone.ply,{column},{label},scene {number % 2}")
+    (folder / "pairs.csv").write_text("\n".join(rows))
+    words = ["calibrate", "pairs.csv", "--model", "model.pt", "--unit", "mm"]
+    assert main([*words, "--out", "mine.pt"]) == 0
+    out, err = capsys.readouterr()
+    assert out.startswith("labeled   2 right and 2 wrong in 2 groups, within 3 % of the diameter\nmissed    not yet: ")
+    assert err.endswith("limits are set on 4 labeled registrations\n")
+    assert main(["explain", "--pairs", "pairs.csv", "--model", "mine.pt", "--unit", "mm", "--json-lines"]) == 0
+    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [line["method"] == "given" for line in lines] == [False, True] * 2
+    assert lines[3]["T_target_source"][0][3] == 3
+    assert all(line["diagnosis"]["guarantee"]["labeled"] for line in lines)
+    before = content(folder)
+    for spoiled, fault in (
+        (rows[:2], "labels: are all right; label some"),
+        ([*rows, rows[1]], "pairs.csv, line 6: is the registration of pairs.csv, line 2; label each"),
+        (
+            [rows[0], "lost.ply,meshes/cone.ply,,,right,", "a.ply,b.ply,,,wrong,"],
+            "pairs.csv, line 2: lost.ply: no such",
+        ),
+        ([*rows, "a.ply,b.ply,0.txt,0.txt,right,c"], "pairs.csv, line 6: pose: is judged as it is, without init or"),
+        (["source,target", "a,b"], "pairs.csv: column 'label' is missing"),
+    ):
+        (folder / "pairs.csv").write_text("\n".join(spoiled))
+        assert main([*words, "--out", "other.pt"]) == 2
+        assert capsys.readouterr().err.splitlines()[-1].startswith(f"gpca calibrate: {fault}")
+    assert main([*words, "--out", "model.pt"]) == 2
+    assert content(folder) == before | {"pairs.csv": content(folder)["pairs.csv"]}
