@@ -42,7 +42,7 @@ def command_lines(text):
 
 
 def tasks_beside_a_clone():
-    """The five tasks that docs/tasks.md shows whole: title -> text."""
+    """The six tasks that docs/tasks.md shows whole: title -> text."""
     _, beside, _ = re.split(r"^## .+$", (ROOT / "docs/tasks.md").read_text(), flags=re.MULTILINE)
     _, *parts = re.split(r"^### (.+) \(\d+ minutes\)$", beside, flags=re.MULTILINE)
     return dict(zip(parts[::2], parts[1::2], strict=True))

@@ -1,12 +1,13 @@
-"""Four of the tasks that docs/tasks.md shows whole: its own commands in a folder of one's own, and what it promises.
+"""Five of the tasks that docs/tasks.md shows whole: its own commands in a folder of one's own, and what it promises.
 
-The fifth, a dataset of one's own, runs Snakemake: tests/workflow/test_tasks.py.
+The sixth, a dataset of one's own, runs Snakemake: tests/workflow/test_tasks.py.
 """
 
 import re
 import shlex
 import shutil
 
+import numpy as np
 import pytest
 
 from gpca.__main__ import main
@@ -18,6 +19,7 @@ from .conftest import SOURCE
 
 EXPLAIN, BENCH, SCORE = "Explain two clouds", "Compare your method with the published ones", "Score predictions"
 DATASET, COMPARE = "Use a dataset of your own", "Compare two runs"
+REPAIR = "Put a wrong registration right"
 TASKS = tasks_beside_a_clone()
 
 
@@ -41,8 +43,8 @@ def do(task):
         assert main(words) == 0, line
 
 
-def test_the_page_shows_five_tasks():
-    assert list(TASKS) == [EXPLAIN, BENCH, SCORE, DATASET, COMPARE]
+def test_the_page_shows_six_tasks():
+    assert list(TASKS) == [EXPLAIN, REPAIR, BENCH, SCORE, DATASET, COMPARE]
     assert all(command_lines(text) for text in TASKS.values())
 
 
@@ -60,6 +62,17 @@ def test_two_clouds_are_explained_by_the_packages_model_on_a_page(folder, regist
     for words in (headline, ">Before<", ">After<", "scan.ply", "What to do", *("noise", "pose", "overlap")):
         assert words in page
     assert not re.search(r"https?:|src=", page)
+
+
+def test_a_registration_that_is_right_keeps_its_pose(folder, registrations, capsys):
+    import trimesh
+
+    points = 0.1 * registrations.target(0)
+    for name, rows in (("scan", slice(None, None, 2)), ("model", slice(None))):
+        trimesh.PointCloud(points[rows]).export(f"{name}.ply")
+    do(REPAIR)
+    assert capsys.readouterr().out.startswith("repair    good: ")
+    np.testing.assert_allclose(np.loadtxt("pose.txt"), np.eye(4), atol=1e-3)
 
 
 def test_a_method_stands_among_the_published_rows_and_so_do_its_predictions(folder, published, run, tmp_path, capsys):

@@ -1,6 +1,6 @@
 """A stranger's tasks: the commands that docs/tasks.md points to or shows, run at tiny size, or by the test named.
 
-The other four of those that it shows whole are in tests/tracks/test_tasks.py.
+The other five of those that it shows whole are in tests/tracks/test_tasks.py.
 """
 
 import re
