@@ -289,6 +289,19 @@ def test_registration_ends_with_the_numbers_of_each_method(capsys):
     assert "6 pairs of up to 64 points" in out
 
 
+def test_settings_of_methods_are_compared_on_the_same_pairs(tmp_path, objects, registrations, capsys):
+    from benchmarks import registration_settings
+
+    for folder, saved in (("objects/tiny.npz", objects), ("registrations/tiny/seed100.npz", registrations)):
+        (tmp_path / folder).parent.mkdir(parents=True)
+        saved.save(tmp_path / folder, *([("tiny", 100)] if saved is registrations else ["tiny"]))
+    registration_settings.main([str(tmp_path), "--pairs", "6", "--methods", "point_to_point"])
+    out = capsys.readouterr().out
+    names = ["posterior", "point_to_point", "point_to_point correspondence_distance=0.25"]
+    assert list(last_line(out)) == [f"success_{name}" for name in names]
+    assert out.startswith("6 pairs, ") and all(f"| {name} | " in out for name in names)
+
+
 def test_results_of_unseen_families_are_judged_by_what_learned_and_was_calibrated_on_others():
     from sklearn.metrics import roc_auc_score
 
