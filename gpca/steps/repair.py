@@ -31,7 +31,7 @@ from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.model.proposed import Errors, Proposed, joined, pose_errors, propose_for
 from gpca.model.repair import Proposals, measured, search
-from gpca.objects.canonical import ObjectClouds
+from gpca.objects.canonical import BY_ICP, ObjectClouds
 from gpca.pairs.distances import ObservedPair
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
@@ -54,18 +54,23 @@ RUNS = 13  # of ICP around a pose, for its spread,
 RUN_ROTATION_DEG, RUN_TRANSLATION = 10.0, 0.05  # root mean square offsets of their starts
 
 
-@dataclass(frozen=True)
-class RepairSettings:
-    """What is asked about.
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """How many registrations are asked about, and by how many points.
 
     Attributes:
         samples: test registrations of each file, at most.
         points: of each cloud that the rivals register, at most.
-        methods: registration methods beside those built in -> their settings.
     """
 
     samples: Count = 1000
     points: Annotated[int, Bounds(minimum=64, maximum=65536)] = 2048
+
+
+@dataclass(frozen=True, kw_only=True)
+class RepairSettings(Asked):
+    """The same, and registration methods beside those built in -> their settings."""
+
     methods: dict[str, Any] = field(default_factory=dict)
 
 
@@ -130,7 +135,7 @@ def attempt(job: Job) -> None:
         if about is not None and "times" in about:  # scans with added noise are left out
             rows = rows[(numbers(path, about, "times") == 0).to_numpy()[rows]]
         if about is not None and "truth" in about:
-            rows = rows[(about["truth"] == "annotated").to_numpy()[rows]]
+            rows = rows[(about["truth"] != BY_ICP).to_numpy()[rows]]
         rows = np.sort(generator(*axes, "repair", "samples").permutation(rows)[: settings.samples])
         if not len(rows):
             raise InputError(job.causes, "has no registration to repair", "raise its number of test samples")
@@ -173,7 +178,7 @@ class World:
         count, cluster_N, group_N = len(causes), registrations.cluster, np.full(len(causes), "all")
         if self.about is not None and "dataset" in self.about:
             cluster_N = (self.about["dataset"] + " " + self.about["scene"].astype(str)).to_numpy(str)
-            group_N = np.where(self.about["start"] == "native", "native", "disturbed")
+            group_N = self.about["start"].to_numpy(str)
         named_N = labels_of(causes.truth)
         sizes = [min(len(registrations.source(row)), len(registrations.target(row))) for row in range(count)]
         return {

@@ -1,0 +1,312 @@
+"""Repair: another pose in the place of a wrong one, and rivals that register again (Table XX)."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, replace
+from math import inf
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gpca.alignment.methods.registry import installed, method_entry, method_module
+from gpca.declarations.experiment import Experiment
+from gpca.declarations.plan import Run
+from gpca.declarations.result import Frame, Paths, numbers, table
+from gpca.declarations.step import Plan, Step, Wildcards
+from gpca.evaluation.intervals import Clustered, weighted_mean
+from gpca.evaluation.measures import ALL, SHARE, Measure, Rivals, compared, intervals, per_seed, source_method_seed
+from gpca.experiments.registration_methods import missing_methods
+from gpca.experiments.scan_causes import reenactment_settings
+from gpca.frames.source import REAL_WORLD
+from gpca.io.csv_file import ANY, read_csv
+from gpca.io.csv_file import numbers as number_column
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.reporting.sheet import Row, Sheet, Show, show
+from gpca.settings import Distinct
+from gpca.steps.repair import LIKELIEST, MANY_STARTS, REPAIR, STARTS, Asked
+from gpca.steps.repair_verdicts import CAUSES, COLUMNS, HARD, JUDGED
+
+NAME = "repair"
+FRAMES, SCANS = "frames", "scans"
+TRACKS = {CAUSES: "Causes", HARD: "Hard", FRAMES: "Depth frames", SCANS: "Scans"}
+POINTS = {"few": (0, 256), "some": (256, 512), "many": (512, inf)}  # of the smaller cloud: above, and at most
+RIVAL = "rival"
+COMPARED = ("repaired", "right_pose")  # measures of which there are differences from the best rival
+OF_REPAIR = ("several", "called", "false_alarms")  # the same for all methods, or of repair alone
+BUILT_IN = {
+    REPAIR: "Repair",
+    LIKELIEST: "Likeliest hypothesis",
+    STARTS: "Best of the 13 starts",
+    MANY_STARTS: "ICP from as many starts as the search",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section(Asked):
+    """The registrations that are asked about, and the registration methods that are rivals."""
+
+    methods: Distinct[str]
+
+
+EXPERIMENT = Experiment(
+    name=NAME,
+    sections={NAME: Section},
+    names=lambda config, _sources: {"repair_method": installed(config[NAME]["methods"])},
+    lists={"repair.methods": "methods"},
+)
+
+
+def _settings(plan: Plan, causes: Mapping[str, Any], reenactment: Mapping[str, Any]) -> dict[str, Any]:
+    config = plan.config
+    methods = {name: config["methods"][name] or {} for name in plan.names["repair_method"]}
+    return {
+        "repair": config[NAME] | {"methods": methods},
+        "causes": config["causes"] | dict(causes),
+        "reenactment": reenactment,
+        "icp": config["registrations"]["icp"],
+    }
+
+
+def _objects(plan: Plan, _wildcards: Wildcards) -> dict[str, Any]:
+    return _settings(plan, {}, plan.config["diagnosis"]["reenactment"])
+
+
+def _outputs(track: str, source: str = "{source}") -> dict[str, str]:
+    return {
+        "attempts": f"repairs/{track}/{source}/seed{{seed}}.npz",
+        "timings": f"timings/{source}/repair_{track}/seed{{seed}}.csv",
+    }
+
+
+ATTEMPT = Step(
+    name="attempt_repairs",
+    run="gpca.steps.repair:attempt",
+    inputs={"objects": "objects/{source}.npz", "causes": "causes/{source}/seed{seed}.npz"},
+    outputs=_outputs(CAUSES),
+    settings=_objects,
+    modules=lambda plan: map(method_module, plan.names["repair_method"]),
+    priority=3,
+)
+ATTEMPT_HARD = replace(
+    ATTEMPT,
+    name="attempt_hard_repairs",
+    inputs={"objects": "objects/{source}.npz", "causes": "hard/{source}/seed{seed}.npz"},
+    outputs=_outputs(HARD),
+    settings=lambda plan, _wildcards: _settings(
+        plan, plan.config["controls"]["hard"], plan.config["diagnosis"]["reenactment"]
+    ),
+    where={"seed": "control_seed"},
+)
+ATTEMPT_FRAMES = replace(
+    ATTEMPT,
+    name="attempt_frame_repairs",
+    inputs={
+        "objects": "objects/{frames}.npz",
+        "causes": "frame_causes/seed{seed}.npz",
+        "samples": "frame_causes/seed{seed}.csv",
+        "reenactments": "reenactments/{frames}/seed{seed}.npz",
+    },
+    outputs=_outputs(FRAMES, "{frames}"),
+    params={"source": REAL_WORLD},
+    where={"seed": "frame_cause_seed"},
+)
+ATTEMPT_SCANS = replace(
+    ATTEMPT,
+    name="attempt_scan_repairs",
+    inputs={
+        "causes": "scan_causes/{source}/seed{seed}.npz",
+        "samples": "scan_causes/{source}/seed{seed}.csv",
+        "reenactments": "scan_reenactments/{source}/seed{seed}.npz",
+    },
+    outputs=_outputs(SCANS),
+    settings=lambda plan, _wildcards: _settings(plan, {}, reenactment_settings(plan.config)),
+    where={"source": "scan_set", "seed": "scan_seed"},
+)
+DECIDE = Step(
+    name="repair_verdicts",
+    run="gpca.steps.repair_verdicts",
+    inputs={
+        "attempts": [
+            f"repairs/{CAUSES}/{{*source}}/seed{{*seed}}.npz",
+            f"repairs/{HARD}/{{*source}}/seed{{*control_seed}}.npz",
+            f"repairs/{FRAMES}/{{frames}}/seed{{*frame_cause_seed}}.npz",
+            f"repairs/{SCANS}/{{*scan_set}}/seed{{*scan_seed}}.npz",
+        ]
+    },
+    outputs={"verdicts": "repairs/verdicts.csv"},
+    settings=lambda plan, _wildcards: {"tolerance": plan.config["success"]["error"]},
+)
+
+
+def read_verdicts(path: str | Path) -> Frame:
+    names = ("track", "source", "seed", "sample", "group", "cluster", "label", "points", "method")
+    rows = read_csv(path, (*names, *COLUMNS), others=ANY)
+    numeric = {name: number_column(path, rows, name) for name in ("seed", "sample", "points")}
+    return rows.assign(**numeric, **{name: rows[name].astype(str) == "True" for name in COLUMNS})
+
+
+def parts_of(rows: Frame) -> Iterator[tuple[str, np.ndarray]]:
+    """Parts of registrations: all, by dominant cause, number of points, source and kind of start."""
+    yield ALL, np.ones(len(rows), bool)
+    yield from ((concept, (rows["label"] == concept).to_numpy()) for concept in CONCEPTS)
+    yield from (
+        (name, ((rows["points"] > least) & (rows["points"] <= most)).to_numpy())
+        for name, (least, most) in POINTS.items()
+    )
+    for column in ("source", "group"):
+        values = rows[column].unique()
+        yield from ((value, (rows[column] == value).to_numpy()) for value in values if len(values) > 1)
+
+
+def rivals_of(name: str, names: Collection[str]) -> list[str]:
+    """Rivals of repair: methods with tests of their own."""
+    return [other for other in names if name == REPAIR != other and not other.endswith(f"_{JUDGED}")]
+
+
+AGAINST: Mapping[str, Rivals] = {RIVAL: rivals_of}
+
+
+@numbers("repair.csv", rule="repair_metrics", verdicts="repairs/verdicts.csv")
+def collect(run: Run, verdicts: str | Path) -> Frame:
+    """Measures with intervals of every track (``source``), method and part of its registrations (``concept``).
+
+    Differences are from the rival with a test of its own that has the most.
+    """
+    [path] = [verdicts] if isinstance(verdicts, (str, Path)) else verdicts
+    return measured(read_verdicts(path))
+
+
+def measured(verdicts: Frame) -> Frame:
+    records: list[tuple] = []
+    for track, rows in verdicts.groupby("track", sort=False):
+        by_method = {str(name): subset.reset_index(drop=True) for name, subset in rows.groupby("method", sort=False)}
+        asked = by_method[REPAIR]
+        draws = Clustered.drawn(asked["seed"], asked["source"] + "/" + asked["cluster"], "repair intervals", track)
+        failed_N, called_N = asked["failed"].to_numpy(), asked["called"].to_numpy()
+        for part, part_N in parts_of(asked):
+            metrics = {
+                "repaired": (part_N & failed_N, lambda each: each["replaced"] & each["right"]),
+                "right_pose": (part_N & failed_N, lambda each: each["right_pose"]),
+                "several": (part_N & failed_N, lambda each: each["several"]),
+                "called": (part_N & failed_N, lambda each: each["called"]),
+                "false_alarms": (part_N & ~failed_N, lambda each: each["called"]),
+                "harmed": (part_N & ~failed_N, lambda each: each["replaced"] & ~each["right"]),
+            }
+            for metric, (mask_N, value) in metrics.items():
+                if mask_N.any():
+                    drawn = draws.subset(mask_N)
+                    named = [REPAIR] if metric in OF_REPAIR else by_method
+                    values = {
+                        name: weighted_mean(value(by_method[name])[mask_N].to_numpy(float), drawn.weights)
+                        for name in named
+                    }
+                    against = AGAINST if metric in COMPARED else None
+                    records += compared((NAME, str(track)), metric, part, values, drawn, SHARE, against)
+            for name, each in by_method.items():
+                mask_N = part_N & called_N & each["replaced"].to_numpy()
+                if mask_N.any():
+                    drawn = draws.subset(mask_N)
+                    values = {name: weighted_mean(~each["right"][mask_N].to_numpy(bool), drawn.weights)}
+                    records += compared((NAME, str(track)), "wrong", part, values, drawn)
+    return intervals(records, "repairs")
+
+
+def read_seconds(files: Paths) -> Frame:
+    """Mean seconds of each method by seed, which differ from run to run."""
+    import pandas as pd
+
+    frames = []
+    for path in files:
+        source, _, seed = source_method_seed(path)
+        rows = read_csv(path, ("sample", "method", "seconds"))
+        seconds = number_column(path, rows, "seconds", least=0)
+        frames.append(rows.assign(seconds=seconds, source=source, seed=seed, table=NAME))
+    mean = {"seconds": Measure("seconds", (0, inf))}
+    return per_seed(pd.concat(frames, ignore_index=True), lambda rows: {ALL: np.ones(len(rows), bool)}, mean)
+
+
+SECTION = "Beyond the paper: registration methods"
+SHOWN = {
+    "repaired": show("repaired", "Repaired (%)"),
+    "lead": show("repaired", "Minus best rival (points)", where={"against": RIVAL}, limits=(-100.0, 100.0)),
+    "wrong": show("wrong", "Wrong of the replaced (%)", least_is_best=True),
+    "harmed": show("harmed", "Harmed (%)", least_is_best=True),
+    "right_pose": show("right_pose", "Right pose (%)"),
+    "several": show("several", "Several (%)", interval=False),
+}
+SECONDS = show("seconds", "ms", factor=1e3, frame="seconds", interval=False, limits=(0, inf), least_is_best=True)
+
+
+def titles_of(run: Run, judged: bool = True) -> dict[str, str]:
+    """Titles of the rows by name: repair, and rivals by their best tests and by the judge."""
+    titles = BUILT_IN | run.titles(method_entry, installed(run.config[NAME]["methods"]))
+    both = ((name, title) for name, title in titles.items() if name != REPAIR)
+    by_judge = {f"{name}_{JUDGED}": f"{title}, by the judge" for name, title in both}
+    return titles | (by_judge if judged else {})
+
+
+@table(
+    SECTION,
+    "Table XX: repair",
+    """Failed registrations that are given a right pose by whoever says that its pose is right, and good ones that
+    are made worse. A registration that is called failed is registered again by each method; its own best test, or the
+    judge, says whether the new pose takes the place of the old one, at a limit that is calibrated to at most 5 % of
+    wrong poses on other families of objects.""",
+    intervals="repair.csv",
+    seconds=(read_seconds, f"timings/{{source}}/repair_{CAUSES}/seed{{seed}}.csv"),
+)
+def table20_repair(run: Run, intervals, seconds):
+    rows = [
+        Row([(track, title), method], {"source": track, "method": method[0]})
+        for track, title in TRACKS.items()
+        for method in titles_of(run).items()
+    ]
+    heads = {"track": "Registrations", "method": "Method"}
+    timed = seconds.assign(source=CAUSES)
+    sheet = Sheet("table20_repair", heads, rows, SHOWN | {"ms": SECONDS}, intervals, {"seconds": timed})
+    row_of_track = {row.where["source"]: i for i, row in enumerate(sheet.rows) if row.where["method"] == REPAIR}
+    counts = {TRACKS[track]: sheet.samples("repaired", row=i) for track, i in row_of_track.items()}
+    return sheet.table(
+        "Failed registrations that are repaired, and good ones that are harmed" + run.stand_ins(),
+        "metric",
+        (
+            f"{sheet.over()}. Failed registrations: {', '.join(f'{title} {n}' for title, n in counts.items())}.",
+            "Repaired, right pose and several: of the failed; harmed: of the good. Wrong: of those whose pose is "
+            "replaced. Right pose: accepted or not. Several: poses are given together of which one is right. ms: of "
+            "objects, on one core, with tests and refinement; it differs from run to run.",
+            "On depth frames and scans, limits come from objects, and nothing is promised.",
+            *missing_methods(run.config[NAME]["methods"]),
+        ),
+        bold=["repaired", "wrong", "harmed", "right_pose"],
+        same=1,
+    )
+
+
+@table(
+    SECTION,
+    "Table XX by cause, points and source",
+    """Repaired shares of the failed registrations of the track of causes, by their dominant cause, by the number of
+    points of the smaller cloud, and by source.""",
+    intervals="repair.csv",
+)
+def table20_parts(run: Run, intervals):
+    titles = titles_of(run, judged=False)
+    rows = [Row([method], {"source": CAUSES, "method": method[0]}) for method in titles.items()]
+    words = {"few": "Up to 256 points", "some": "Up to 512", "many": "More"}
+    parts = {name: name.capitalize() for name in CONCEPTS} | words | run.source_titles
+    columns: dict[str, Show] = {
+        part: show("repaired", f"{title} (%)", part, decimals=0) for part, title in parts.items()
+    }
+    sheet = Sheet("table20_parts", {"method": "Method"}, rows, columns, intervals)
+    failed = {title: sheet.samples(part) for part, title in parts.items()}
+    return sheet.table(
+        "Failed registrations that are repaired (%), by part" + run.stand_ins(),
+        "part",
+        (
+            f"{sheet.over()}. Failed: {', '.join(f'{title} {count}' for title, count in failed.items() if count)}.",
+            "Rivals are accepted by their best tests, as in Table XX.",
+        ),
+        bold=columns,
+    )
