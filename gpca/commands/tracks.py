@@ -14,15 +14,16 @@ from gpca.jobs.arguments import COUNT
 from gpca.tracks import leaderboard
 from gpca.tracks.published import FOLDER, Published
 from gpca.tracks.submission import LINK_REMEDY, is_link, read_submission
-from gpca.tracks.track import DEFAULT, TRACKS, Track, track_of
+from gpca.tracks.track import CAUSES_TRACK, DEFAULT, TRACKS, Track, track_of
 
+REPAIR = "repair"  # a track of poses, not of predictions
 LARGEST_BYTES = 10**7  # of the published predictions of all tracks, which are kept in git
 
 
 def add_bench_arguments(parser: ArgumentParser) -> None:
     """Declare the track and the method; ``--settings`` are the method's."""
     add = parser.add_argument
-    add("track", help=f"one of {', '.join(TRACKS)}")
+    add("track", help=f"one of {', '.join(TRACKS)}, or repair")
     add("method", help="a file such as my_method.py, an installed module, or the name of an explainer")
     add("--out", type=Path, help="CSV of its predictions, for gpca score and the leaderboard")
     add("--authors", default="unknown", help="authors, for the head of that file")
@@ -41,6 +42,13 @@ def run_bench(options: Namespace) -> None:
     from gpca.tracks.submission import Submission
     from gpca.tracks.trial import try_method
 
+    if options.track == REPAIR:
+        from gpca.tracks.repair import own_function, repair_table
+
+        function = own_function(options.method)
+        samples = TrackSamples.of(TRACKS[CAUSES_TRACK], options.samples, options.processes)
+        print(leaderboard.as_text(repair_table(samples, function, Path(options.method).stem)))
+        return
     track = track_of(options.track)
     if not is_link(options.link):
         raise InputError("--link", f"is '{options.link[:40]}'", LINK_REMEDY)

@@ -16,14 +16,15 @@ from gpca.declarations.plan import Run
 from gpca.declarations.result import Frame, Paths, numbers, table
 from gpca.declarations.step import Plan, Step, Wildcards
 from gpca.evaluation.intervals import Clustered, weighted_mean
-from gpca.evaluation.measures import ALL, SHARE, Measure, Rivals, compared, intervals, per_seed, source_method_seed
+from gpca.evaluation.measures import ALL, SHARE, Measure, Rivals, compared, intervals, per_seed
 from gpca.experiments.registration_methods import missing_methods
 from gpca.experiments.scan_causes import reenactment_settings
 from gpca.frames.source import REAL_WORLD
 from gpca.io.csv_file import ANY, read_csv
 from gpca.io.csv_file import numbers as number_column
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.sheet import Row, Sheet, Show, show
+from gpca.reporting.sheet import Row, Sheet, Show, crossed, show
+from gpca.seeds import seed_of_file
 from gpca.settings import Distinct
 from gpca.steps.repair import LIKELIEST, MANY_STARTS, REPAIR, STARTS, Asked
 from gpca.steps.repair_verdicts import CAUSES, COLUMNS, HARD, JUDGED
@@ -58,9 +59,9 @@ EXPERIMENT = Experiment(
 )
 
 
-def _settings(plan: Plan, causes: Mapping[str, Any], reenactment: Mapping[str, Any]) -> dict[str, Any]:
-    config = plan.config
-    methods = {name: config["methods"][name] or {} for name in plan.names["repair_method"]}
+def own_settings(config: Mapping[str, Any], causes: Mapping, reenactment: Mapping) -> dict[str, Any]:
+    """Settings of the attempts, given what differs from `causes`, and the settings of re-enactments."""
+    methods = {name: config["methods"][name] or {} for name in installed(config[NAME]["methods"])}
     return {
         "repair": config[NAME] | {"methods": methods},
         "causes": config["causes"] | dict(causes),
@@ -70,7 +71,7 @@ def _settings(plan: Plan, causes: Mapping[str, Any], reenactment: Mapping[str, A
 
 
 def _objects(plan: Plan, _wildcards: Wildcards) -> dict[str, Any]:
-    return _settings(plan, {}, plan.config["diagnosis"]["reenactment"])
+    return own_settings(plan.config, {}, plan.config["diagnosis"]["reenactment"])
 
 
 def _outputs(track: str, source: str = "{source}") -> dict[str, str]:
@@ -94,8 +95,8 @@ ATTEMPT_HARD = replace(
     name="attempt_hard_repairs",
     inputs={"objects": "objects/{source}.npz", "causes": "hard/{source}/seed{seed}.npz"},
     outputs=_outputs(HARD),
-    settings=lambda plan, _wildcards: _settings(
-        plan, plan.config["controls"]["hard"], plan.config["diagnosis"]["reenactment"]
+    settings=lambda plan, _wildcards: own_settings(
+        plan.config, plan.config["controls"]["hard"], plan.config["diagnosis"]["reenactment"]
     ),
     where={"seed": "control_seed"},
 )
@@ -121,7 +122,7 @@ ATTEMPT_SCANS = replace(
         "reenactments": "scan_reenactments/{source}/seed{seed}.npz",
     },
     outputs=_outputs(SCANS),
-    settings=lambda plan, _wildcards: _settings(plan, {}, reenactment_settings(plan.config)),
+    settings=lambda plan, _wildcards: own_settings(plan.config, {}, reenactment_settings(plan.config)),
     where={"source": "scan_set", "seed": "scan_seed"},
 )
 DECIDE = Step(
@@ -214,17 +215,19 @@ def measured(verdicts: Frame) -> Frame:
 
 
 def read_seconds(files: Paths) -> Frame:
-    """Mean seconds of each method by seed, which differ from run to run."""
+    """Mean seconds of each method by seed, over all sources of objects; they differ from run to run."""
     import pandas as pd
 
     frames = []
     for path in files:
-        source, _, seed = source_method_seed(path)
         rows = read_csv(path, ("sample", "method", "seconds"))
-        seconds = number_column(path, rows, "seconds", least=0)
-        frames.append(rows.assign(seconds=seconds, source=source, seed=seed, table=NAME))
+        frames.append(rows.assign(seconds=number_column(path, rows, "seconds", least=0), seed=seed_of_file(path)))
+    return mean_seconds(pd.concat(frames, ignore_index=True))
+
+
+def mean_seconds(rows: Frame) -> Frame:
     mean = {"seconds": Measure("seconds", (0, inf))}
-    return per_seed(pd.concat(frames, ignore_index=True), lambda rows: {ALL: np.ones(len(rows), bool)}, mean)
+    return per_seed(rows.assign(table=NAME, source=CAUSES), lambda each: {ALL: np.ones(len(each), bool)}, mean)
 
 
 SECTION = "Beyond the paper: registration methods"
@@ -239,12 +242,20 @@ SHOWN = {
 SECONDS = show("seconds", "ms", factor=1e3, frame="seconds", interval=False, limits=(0, inf), least_is_best=True)
 
 
-def titles_of(run: Run, judged: bool = True) -> dict[str, str]:
+def titles_of(config: Mapping[str, Any], judged: bool = True) -> dict[str, str]:
     """Titles of the rows by name: repair, and rivals by their best tests and by the judge."""
-    titles = BUILT_IN | run.titles(method_entry, installed(run.config[NAME]["methods"]))
+    names = installed(config[NAME]["methods"])
+    titles = BUILT_IN | {name: method_entry(name).title for name in names}
     both = ((name, title) for name, title in titles.items() if name != REPAIR)
     by_judge = {f"{name}_{JUDGED}": f"{title}, by the judge" for name, title in both}
     return titles | (by_judge if judged else {})
+
+
+def repair_sheet(titles: Mapping[str, str], intervals: Frame, seconds: Frame) -> Sheet:
+    """Rows of all tracks and methods; the seconds are those of objects."""
+    axes = ("source", TRACKS), ("method", titles)
+    heads, columns = {"track": "Registrations", "method": "Method"}, SHOWN | {"ms": SECONDS}
+    return Sheet("table20_repair", heads, crossed(*axes), columns, intervals, {"seconds": seconds})
 
 
 @table(
@@ -258,14 +269,7 @@ def titles_of(run: Run, judged: bool = True) -> dict[str, str]:
     seconds=(read_seconds, f"timings/{{source}}/repair_{CAUSES}/seed{{seed}}.csv"),
 )
 def table20_repair(run: Run, intervals, seconds):
-    rows = [
-        Row([(track, title), method], {"source": track, "method": method[0]})
-        for track, title in TRACKS.items()
-        for method in titles_of(run).items()
-    ]
-    heads = {"track": "Registrations", "method": "Method"}
-    timed = seconds.assign(source=CAUSES)
-    sheet = Sheet("table20_repair", heads, rows, SHOWN | {"ms": SECONDS}, intervals, {"seconds": timed})
+    sheet = repair_sheet(titles_of(run.config), intervals, seconds)
     row_of_track = {row.where["source"]: i for i, row in enumerate(sheet.rows) if row.where["method"] == REPAIR}
     counts = {TRACKS[track]: sheet.samples("repaired", row=i) for track, i in row_of_track.items()}
     return sheet.table(
@@ -292,7 +296,7 @@ def table20_repair(run: Run, intervals, seconds):
     intervals="repair.csv",
 )
 def table20_parts(run: Run, intervals):
-    titles = titles_of(run, judged=False)
+    titles = titles_of(run.config, judged=False)
     rows = [Row([method], {"source": CAUSES, "method": method[0]}) for method in titles.items()]
     words = {"few": "Up to 256 points", "some": "Up to 512", "many": "More"}
     parts = {name: name.capitalize() for name in CONCEPTS} | words | run.source_titles

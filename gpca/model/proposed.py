@@ -120,7 +120,8 @@ def joined(proposals: Sequence[Proposals], errors: Sequence[np.ndarray], family_
     for each, error_n in zip(proposals, errors, strict=True):
         evidence, count = each.evidence, 1 + each.evidence.weight_N_K.shape[1]
         row_P = np.where(np.arange(count) < len(error_n), np.arange(count), 1)
-        weight_P = np.where(np.arange(count) < len(error_n), each.weight_n[row_P], 0)
+        # Sums of probabilities may be rounded up.
+        weight_P = np.where(np.arange(count) < len(error_n), each.weight_n[row_P], 0).clip(0, 1)
         measured_P = evidence.inlier_rmse_N[row_P], evidence.fitness_N[row_P]
         columns.append((error_n[row_P], weight_P, evidence.distance_N_K[row_P], evidence.weight_N_K[0], *measured_P))
     error, weight, distance, hypothesis, rmse, fitness = (np.array(column) for column in zip(*columns, strict=True))

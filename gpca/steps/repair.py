@@ -5,7 +5,7 @@ Whether a pose is accepted is decided later, by judges and limits of other famil
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from time import perf_counter
@@ -26,7 +26,7 @@ from gpca.causes.truth import capped
 from gpca.errors import InputError
 from gpca.io.arrays import TEXT, WHOLE
 from gpca.io.container import Container, array
-from gpca.io.csv_file import ANY, numbers, read_csv, write_csv
+from gpca.io.csv_file import ANY, finite_number, numbers, read_csv, write_csv
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.model.proposed import Errors, Proposed, joined, pose_errors, propose_for
@@ -40,7 +40,7 @@ from gpca.reenactment.hypotheses import search_starts
 from gpca.reenactment.scans import REACH
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
-from gpca.rigid import exp, inverse, inverses, transform
+from gpca.rigid import exp, inverse, inverses, require_rigid, transform
 from gpca.scans.pair import near
 from gpca.seeds import generator, seed_of
 from gpca.settings import Bounds, Count, read_settings
@@ -52,6 +52,9 @@ NEVER = 1e6  # score of a pose that is not accepted
 TRIMMED = 0.8  # share of the distances that a trimmed cost counts, the smallest
 RUNS = 13  # of ICP around a pose, for its spread,
 RUN_ROTATION_DEG, RUN_TRANSLATION = 10.0, 0.05  # root mean square offsets of their starts
+
+
+Own = Callable[[np.ndarray, np.ndarray, np.ndarray], Any]  # observed, model, initial pose -> pose, with confidence
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -208,11 +211,12 @@ def try_all(
     moved: Moved,
     hypotheses: Callable[[ObservedPair, int], tuple[np.ndarray, np.ndarray]],
     axes: tuple,
+    functions: Mapping[str, Own] | None = None,
 ) -> tuple[Attempts, Any]:
-    """Return the attempts at every registration, and a frame of the seconds of each method."""
+    """Return the attempts at every registration, and a frame of the seconds of each method; see :class:`Rivals`."""
     import pandas as pd
 
-    methods = {name: make_method(name, entry) for name, entry in settings.methods.items()}
+    methods, functions = {name: make_method(name, entry) for name, entry in settings.methods.items()}, functions or {}
     proposals, errors, columns, seconds = [], [], [], []
     registrations = causes.registrations
     for row in progress(range(len(causes)), f"repairs of {axes[0]}, seed {axes[1]}"):
@@ -224,6 +228,7 @@ def try_all(
         errors.append(world.errors(row, proposals[-1].T_n))
         rival = Rivals(pair, surface, icp, settings.points, proposals[-1], perf_counter() - started)
         tried = [*rival.built_in(), *(rival.by(name, method, warm=row == 0) for name, method in methods.items())]
+        tried += [rival.by_function(name, function) for name, function in functions.items()]
         T_M = np.array([each.T for each in tried])
         fitness_M, rmse_M = measured(rival.before, pair.model, icp, moved)(T_M)
         distance_M_K = np.stack([surface.errors(T @ inverses(T_K)) for T in T_M])
@@ -243,7 +248,7 @@ def try_all(
         fitness_N_C=np.hstack([proposed.fitness_N_P, fitness_N_M]),
         family_N=registrations.cluster,
         score_N_M_Q=score_N_M_Q,
-        method_M=np.array([*BUILT_IN, *methods]),
+        method_M=np.array([*BUILT_IN, *methods, *functions]),
     )
     return attempts, pd.DataFrame(seconds, columns=["sample", "method", "seconds"])
 
@@ -301,6 +306,18 @@ class Rivals:
         refined = self.registrar.register(self.before, outcome.T_target_source[None])[0]
         T = self._best(np.concatenate([outcome.T_target_source[None], refined]))
         return self._tried(name, started, T, failed=not outcome.converged)
+
+    def by_function(self, name: str, function: Own) -> Tried:
+        """Return the pose of a function of observed cloud, model and initial pose, whose doubt is its negative
+        confidence; a function that abstains leaves the registered pose, which is not accepted."""
+        started = perf_counter()
+        answer = function(self.before.copy(), self.pair.model.copy(), np.eye(4))
+        T, confidence = answer if isinstance(answer, tuple) else (answer, 0.0)
+        if T is None:
+            return self._tried(name, started, inverse(self.pair.T_init), failed=True)
+        T = np.asarray(T, float)
+        require_rigid(T, f"pose by {name}")
+        return self._tried(name, started, T, finite_number(name, "confidence", str(confidence), "return a number") * -1)
 
     def _tried(self, name: str, started: float, T: np.ndarray, doubt: float = 1.0, failed: bool = False) -> Tried:
         _, fitness_n, rmse_n = self.registrar.register(self.before, T[None], max_iterations=0)

@@ -16,7 +16,7 @@ from gpca.jobs.provenance import record_provenance
 from gpca.model.diagnoser import threshold_of
 from gpca.model.proposed import with_repair
 from gpca.model.repair import REPAIRED, SEVERAL, decide
-from gpca.model.result import Calibrated, ResultJudge
+from gpca.model.result import EVEN, Calibrated, ResultJudge
 from gpca.steps.repair import REPAIR, TESTS, Attempts
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def learn_limits(learned: Attempts, tolerance: float) -> Limits:
         result_N[unseen] = proposed.subset(unseen).probabilities(judge, tolerance)[:, 0]
         judged_N_M[unseen] = rivals.subset(unseen).probabilities(judge, tolerance)
     off_N = proposed.error_N_P[:, 0] > tolerance
-    threshold = threshold_of(result_N[~off_N], FALSE_ALARMS)
+    threshold = EVEN if off_N.all() else threshold_of(result_N[~off_N], FALSE_ALARMS)
     [level] = with_repair([Calibrated(tolerance, threshold)], proposed)
     if level.repaired_below is None:  # nothing is
         level = replace(level, repaired_below=0.0)

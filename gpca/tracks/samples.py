@@ -185,6 +185,16 @@ def recipe_of(file: str, config: Mapping[str, Any]) -> Recipe:
         outputs = {name: f"{name}/{source}.npz" for name in ("instances", "objects")}
         return Recipe("gpca.steps.frames:instances", given, _splits("scenes", config), outputs)
     seed = int(rest[-1].removeprefix("seed"))
+    if kind == "repairs":
+        from gpca.experiments.repair import own_settings
+
+        source = rest[1]
+        settings = own_settings(config, {}, config["diagnosis"]["reenactment"])
+        outputs = {"attempts": file, "timings": f"timings/{source}/repair_causes/seed{seed}.csv"}
+        inputs = {"objects": f"objects/{source}.npz", "causes": f"causes/{source}/seed{seed}.npz"}
+        return Recipe(
+            "gpca.steps.repair:attempt", {"source": source, "seed": seed, "settings": settings}, inputs, outputs
+        )
     diagnosis, causes, controls = config["diagnosis"], config["causes"], config["controls"]
     if kind in ("frame_causes", "frame_starts") or (kind == "reenactments" and rest[0] == REAL_WORLD):
         settings = frame_settings | {"causes": causes} | icp

@@ -26,6 +26,7 @@ STEPS = {  # module of gpca.steps -> the steps that it has, functions of their n
     "pairs": "objects registrations uncertainty train embed reduce attribute",
     "readings.files": "readings=run join_repeats=join",
     "readings.severities": "retrain",
+    "repair": "attempt",
     "scan_causes": "scan_causes=measure diagnose_scans=diagnose",
     "scans": "draw_scans",
     "shift": "shift learners=fit_learners",
@@ -36,6 +37,7 @@ MODULES = {  # modules with a function ``run``
     "estimate": "gpca.steps.estimates",
     "recover": "gpca.steps.recovery",
     "register_methods": "gpca.steps.registration_trials",
+    "repair_verdicts": "gpca.steps.repair_verdicts",
     "register_scans": "gpca.steps.scan_trials",
 }
 for module, steps in STEPS.items():
@@ -61,6 +63,7 @@ LISTS = {  # which names of a step are lists, and not of one seed, file or name
     "register_methods": "seeds methods registrations rows timings",
     "draw_scans": "data",
     "register_scans": "methods rows timings",
+    "repair_verdicts": "attempts",
     "readings": "registrations sets predictions embeddings retrained",
     "choose_joint": "measured",
     "apply_joint": "sets other_sets",
@@ -71,7 +74,7 @@ LISTS = {  # which names of a step are lists, and not of one seed, file or name
     ),
     "exchange": "seeds registrations encoders out",
     "attribute": "seeds registrations embeddings uncertainty uncertainty_timings input_timings predictions timings",
-    "model": "causes reenactments",
+    "model": "objects causes reenactments",
     "reduce": "seeds embeddings out",
     "train": "registrations registrations_of",
     "uncertainty": "seeds registrations outcomes tables timings",

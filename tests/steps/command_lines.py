@@ -237,6 +237,15 @@ STEP_OPTIONS = {
         "--embeddings": "embeddings.npz", "--labels": "labels.csv", "--answers": "answers.txt",
         "--predictions": "labelled.csv",
     },
+    "attempt": COMMON | {
+        "--settings": REENACTED | {"repair": {"samples": 4, "methods": {"fgr": {}}}}, "--seed": 0,
+        "--objects": "objects.npz", "--causes": "causes.npz", "--attempts": "repairs/causes/tiny/seed0.npz",
+        "--timings": "repairs.csv",
+    },
+    "repair_verdicts": {
+        "--settings": {"tolerance": 0.03}, "--attempts": "repairs/causes/tiny/seed0.npz",
+        "--verdicts": "repairs/verdicts.csv",
+    },
     "model": COMMON | {
         "--settings": {"encoder": ENCODER, "gpc": FEW,
                        "registrations": {"cloud_points": 128}, "recovery": POLICY, "causes": CAUSES,
@@ -244,7 +253,7 @@ STEP_OPTIONS = {
                        "model": {"classifier": FEW}},
         "--title": "Tiny", "--stand-in": [], "--seed": 0, "--registrations": "registrations.npz",
         "--encoder": "weights.pt", "--embeddings": "embeddings.npz", "--causes": "causes.npz",
-        "--reenactments": "reenactments.npz", "--out": "model.pt",
+        "--reenactments": "reenactments.npz", "--objects": "objects.npz", "--out": "model.pt",
     },
     "runtime": COMMON | {
         "--settings": {"runtime": {"repeats": 2}, "active_learning": LEARNING}, "--seed": 0, "--model": "model.pt",
