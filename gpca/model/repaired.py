@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from gpca.causes.settings import OBSERVED
 from gpca.model import page
 from gpca.model.clouds import FEWEST_MATCHES, Clouds, voids_of
 from gpca.model.diagnosis import CHECK, TAKE, UNKNOWN, FittingPose
-from gpca.model.explanation import GIVEN, UNKNOWN_STATUS, ExplainedRegistration
+from gpca.model.explanation import GIVEN, UNKNOWN_STATUS, ExplainedRegistration, PoseSpread
 from gpca.model.file import Model
 from gpca.model.repair import (
     GOOD,
@@ -39,6 +39,7 @@ from gpca.model.repair import (
 )
 from gpca.model.result import calibrated_at
 from gpca.model.scene import Scene
+from gpca.model.undetermined import Undetermined, undetermined_at
 from gpca.numerals import in_decimals
 from gpca.objects.canonical import CanonicalFrame
 from gpca.reenactment.registration import pose_posterior
@@ -50,6 +51,7 @@ STATUSES = {GOOD: 0, REPAIRED: 0, UNKNOWN: UNKNOWN_STATUS, NOT_REPAIRED: 4, SEVE
 ACTIONS = {GOOD: NOTHING, REPAIRED: TAKE}  # for the others, `CHECK`
 TONES = {GOOD: "good", REPAIRED: "good", NOT_REPAIRED: "bad"}  # CSS classes; for the others, "doubt"
 LOST = "the registration ended away from the target: poses were sought anywhere, and nothing is promised"
+SURFACE = "surface"  # estimator of the spread: how the surface holds the points that were seen
 ALONG = 0.95  # cosine of the angle to an axis within which that axis names a direction
 
 
@@ -99,6 +101,7 @@ class Repair(ExplainedRegistration):
     wrong: float | None = None  # at most this share of poses that are called repaired is wrong; None: no promise
     outliers: float | None = None  # share of the source at the likeliest pose; None of a good one, as the next
     missing: Part | None = None  # the part of the target that was not seen there; None if nearly all was
+    free: Undetermined | None = None  # what the source leaves undetermined there, whose covariance is the `spread`
     poses: tuple[OtherPose, ...] = ()  # that the search found, refined; if several fit, these alone
     seconds: float = 0.0  # duration
 
@@ -156,8 +159,12 @@ class Repair(ExplainedRegistration):
         errors_n = diagnoser.judge.error(proposals.evidence)
         poses = [pose.outside(frame, T_init) for pose in other_poses(proposals, verdict, errors_n, surface)]
         if verdict.name != GOOD:
-            outliers, missing = unseen(clouds.source, surface, proposals.T_n[verdict.row or 1])
-            unrepaired = replace(unrepaired, outliers=outliers, missing=missing)
+            T_best = proposals.T_n[verdict.row or 1]
+            outliers, missing, noise = unseen(clouds.source, surface, T_best)
+            free = undetermined_at(transform(T_best, before), surface, noise)
+            spread = PoseSpread(free.covariance, frame.diameter, SURFACE, None)
+            parts: dict[str, Any] = {"free": free.outside(frame), "spread": spread}
+            unrepaired = replace(unrepaired, outliers=outliers, missing=missing, **parts)
         probability_n = verdict.probability_n.tolist()
         T_new = poses[verdict.row - 1].T_target_source if verdict.row else T_registered
         if verdict.rows:
@@ -204,6 +211,10 @@ class Repair(ExplainedRegistration):
             lines.append(f"promise   {self._promise}")
         if self.verdict != GOOD:
             lines.append(f"seen      {self._seen}")
+        if self.spread is not None:
+            rotation, shift = in_decimals(self.spread.rotation_deg), in_decimals(self.spread.translation)
+            lines.append(f"spread    {rotation}° and {shift} {self.unit}, root mean square")
+            lines += self.free.lines(self.unit) if self.free else []
         if not self.settled:
             lines += [pose.line(number, self.unit) for number, pose in enumerate(self.poses, 1)]
         return lines
