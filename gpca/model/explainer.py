@@ -141,6 +141,8 @@ class Explainer:
         with _timed(seconds, "familiarity"):
             unusual, unusual_to_gpca = self.model.familiar.warnings(clouds.source, clouds.target)
             warnings = [*map(str, voids), *unusual]
+            if voids and diagnosis is not None and (scale := diagnosis.reenacted.scale) and scale.off:
+                warnings.append(scale.words)
             if diagnosis is not None and diagnosis.unlikeness > 1:
                 warnings.append(
                     f"the pair is {diagnosis.unlikeness:.1f} times as far from the registrations that the diagnosis "
@@ -164,7 +166,8 @@ class Explainer:
         if repair:
             with _timed(seconds, "repair"):
                 repaired = Repair.of(self.model, clouds, outcome, method if register else GIVEN, limit, unit=unit)
-        if repaired is not None and repaired.verdict == REPAIRED:
+        rescale = diagnosis is not None and diagnosis.wrong_scale
+        if repaired is not None and repaired.verdict == REPAIRED and not rescale:
             decision = Decision(TAKE, "", repaired.reason)
         elif voids:
             decision = Decision(CHECK, "", ", ".join(void.check for void in voids))
