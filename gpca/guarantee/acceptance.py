@@ -7,7 +7,7 @@ from statistics import NormalDist
 import numpy as np
 
 WRONG = 0.05  # largest share of wrong poses among those that are accepted
-CONFIDENCE = 0.9
+CONFIDENCE = 0.8
 
 
 def accepted_below(
