@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import subprocess
 import sys
 from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path, PurePosixPath
@@ -22,6 +22,7 @@ import numpy as np
 
 from gpca.errors import InputError
 from gpca.frames.source import REAL_WORLD
+from gpca.jobs.provenance import RECORD
 from gpca.process.code_files import ROOT
 from gpca.process.plugins import named
 from gpca.steps.control_samples import HARD
@@ -76,7 +77,7 @@ class TrackSamples:
         """Return files by their paths below the folder; missing ones are made, and all are checked."""
         names = list(names)
         if self.folder == cache_of(self.track) and any(self._fault(name) for name in names):
-            shutil.rmtree(self.folder)  # of an earlier version
+            self._clear()  # what an earlier version made
         if missing := [name for name in names if not (self.folder / name).is_file()]:
             make(missing, self.folder, self.config, self.processes)
         for name in names:
@@ -85,6 +86,15 @@ class TrackSamples:
                 remedy += f", {self.published.commit[:12]}" if self.published.commit else ""
                 raise InputError(self.folder / name, fault, remedy)
         return [self.folder / name for name in names]
+
+    def _clear(self) -> None:
+        """Remove what the suite has made here, which has a record beside it, and nothing else."""
+        for record in self.folder.rglob(f"*{RECORD}"):
+            file = record.with_name(record.name.removesuffix(RECORD))
+            with suppress(InputError, ValueError, LookupError):  # the file of someone else
+                recipe_of(str(file.relative_to(self.folder)), self.config)
+                file.unlink(missing_ok=True)
+                record.unlink(missing_ok=True)
 
     def _fault(self, name: str) -> str:
         """Return how a file differs from the expected one; empty where it does not, or is missing."""

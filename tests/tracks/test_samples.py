@@ -1,5 +1,6 @@
 """TrackSamples: hashed by what they hold, made where they are missing, refused where they differ; and as objects."""
 
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -42,6 +43,24 @@ def test_samples_that_are_not_the_published_ones_are_refused(published, run, cau
     replace(causes, registrations=named).save(tmp_path / FILE)
     with pytest.raises(InputError, match=r"differs from what the published rows were made with .* remove it"):
         TrackSamples(TRACKS["causes"], published, tmp_path).files([FILE])
+
+
+def test_a_cache_is_cleared_of_what_it_made_and_of_nothing_else(published, run, config, tmp_path, monkeypatch):
+    cache = tmp_path / "cache"
+    (tmp_path / "elsewhere").mkdir()
+    cache.symlink_to("elsewhere")
+    monkeypatch.setattr(module, "cache_of", lambda _track: cache)
+    monkeypatch.setattr(TrackSamples, "config", config)
+    mine = [cache / name for name in ("notes.txt", "causes/mine.npz", "thesis/a.npz", "thesis/a.npz.provenance.json")]
+    old = [cache / name for name in (FILE, f"{FILE}.provenance.json", f"causes/{SOURCE}/seed{SEED}.csv")]
+    for path in (*mine, *old, cache / f"causes/{SOURCE}/seed{SEED}.csv.provenance.json"):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("{}")
+    np.savez(old[0], a=np.arange(3))
+    made = []
+    monkeypatch.setattr(module, "make", lambda files, *_: made.extend(files) or shutil.copy(run / FILE, old[0]))
+    assert TrackSamples(TRACKS["causes"], published, cache).files([FILE]) == [old[0]]
+    assert made == [FILE] and all(path.is_file() for path in mine) and not any(path.exists() for path in old[1:])
 
 
 @pytest.fixture(scope="module")
