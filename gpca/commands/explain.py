@@ -5,17 +5,19 @@ from __future__ import annotations
 import json
 import sys
 from argparse import Action, ArgumentParser, Namespace
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gpca.commands.explain_inputs import FILES, Inputs, from_rows, from_words, inputs_in, target_reader
+from gpca.commands.explain_inputs import COLUMNS, FILES, Inputs, from_rows, from_words, inputs_in, target_reader
 from gpca.errors import InputError
 from gpca.io.files import printable, require_apart
 from gpca.jobs.arguments import length
+from gpca.model.clouds import require_format
 from gpca.model.location import model_path, require_model
 from gpca.objects.surface import METERS_PER_UNIT
 
@@ -79,7 +81,7 @@ def run_explain(options: Namespace) -> int:
     """Read all files, then explain and print one source after the other; everything but results goes to stderr.
 
     Files, except for those of a CSV, are read before heavy libraries are loaded, so that most mistakes are reported at
-    once. Returns 2 if a row of the CSV has a fault, else the largest status of an explanation.
+    once. Returns 2 if a source or row of several has a fault, else the largest status of an explanation.
     """
     _require_options(options)
     path = None if options.scans else model_path(options.model)
@@ -89,10 +91,33 @@ def run_explain(options: Namespace) -> int:
     row_files = [options.pairs.parent / name for _, row in rows for key in FILES if (name := row.get(key))]
     require_apart(options, [*OF_ONE, "queue"], [*filter(None, [path]), *row_files])
     inputs = [] if options.pairs else from_words(options)
-    for each in inputs:
-        each.require_formats()
     read_target = target_reader(options.scans)
-    given = [(each, each.read(read_target)) for each in inputs]
+    statuses, given = {0}, []
+
+    @contextmanager
+    def told(source: object, target: object, place: str = "") -> Iterator[None]:
+        """With lines of JSON, a fault of one source is its line, and the others go on."""
+        try:
+            yield
+        except InputError as fault:
+            if not options.json_lines:
+                raise
+            statuses.add(FAULTY_STATUS)
+            names = {"source": printable(source), "target": printable(target)}
+            print(json.dumps(names | {"error": str(fault)}), flush=True)
+            print(f"gpca {options.command}: {place}{fault}", file=sys.stderr)
+
+    if inputs:
+        require_format(options.target)
+        for each in inputs if not options.json_lines else ():
+            require_format(each.source)
+        read_target(options.target)
+    for each in inputs:
+        with told(each.source, each.target):
+            require_format(each.source)
+            given.append((each, each.read(read_target)))
+    if not given and not rows:
+        return FAULTY_STATUS
     # Unknown methods and estimators are reported here, so that no message blames a file for them.
     if options.method is not None:
         from gpca.alignment.methods.registry import make_method
@@ -143,7 +168,6 @@ def run_explain(options: Namespace) -> int:
                 repair=options.repair,
                 **common,
             )
-    statuses = {0}
 
     def explain_one(each: Inputs, arguments: dict[str, Any]) -> None:
         try:
@@ -157,14 +181,13 @@ def run_explain(options: Namespace) -> int:
             _queue(options.queue, explainer, explanation, " to ".join(files.values()))
 
     for each, arguments in given:
-        explain_one(each, arguments)
+        with told(each.source, each.target):
+            explain_one(each, arguments)
     for place, row in _with_progress(rows):
-        try:
+        source, target = (options.pairs.parent / (row.get(name) or "") for name in COLUMNS)
+        with told(source, target, f"{place}: "):
             each = inputs_in(row, options)
             explain_one(each, each.read(read_target))
-        except InputError as fault:  # the other rows are explained
-            print(f"gpca {options.command}: {place}: {fault}", file=sys.stderr)
-            statuses.add(FAULTY_STATUS)
     print(learned, file=sys.stderr)
     return FAULTY_STATUS if FAULTY_STATUS in statuses else max(statuses)
 

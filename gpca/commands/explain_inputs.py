@@ -14,7 +14,7 @@ import numpy as np
 
 from gpca.errors import InputError, refusing, require_known
 from gpca.io.files import require_file
-from gpca.model.clouds import read_points, read_pose, read_target, require_format
+from gpca.model.clouds import read_points, read_pose, read_target
 from gpca.objects.canonical import CanonicalFrame
 from gpca.objects.sizes import AS_OPTIONS, extent, require_sizes
 from gpca.objects.surface import METERS_PER_UNIT, measured
@@ -35,11 +35,6 @@ class Inputs:
     unit: str  # of the target, the pose and the results
     source_unit: str | None  # None: the same
     judged: bool = False  # whether the pose is judged as it is
-
-    def require_formats(self) -> None:
-        """Raise an InputError for a cloud that is missing or of another format, before anything is read."""
-        for cloud in (self.source, self.target):
-            require_format(cloud)
 
     def read(self, read_target: TargetReader) -> dict[str, Any]:
         """Return the arguments of the function that explains; InputError for a fault of a file."""

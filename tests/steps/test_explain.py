@@ -181,6 +181,19 @@ def test_several_sources_are_a_line_each(folder, capsys):
     assert "meshes/brick.stl: source: 128 of 16384 points, drawn at random\n" in err
 
 
+def test_a_faulty_source_is_a_line_and_the_others_go_on(folder, capsys):
+    (folder / "noise.ply").write_bytes(b"ply")
+    sources = ["noise.ply", "meshes/brick.stl", "lost.ply", "meshes/cone.txt"]
+    words = ["explain", *sources, "meshes/cone.ply", "--unit", "mm", "--model", "model.pt", "--json-lines"]
+    assert main(words) == 2
+    out, err = capsys.readouterr()
+    lines = [json.loads(line) for line in out.splitlines()]
+    assert {line["source"]: "error" in line for line in lines} == dict.fromkeys(sources, True) | {sources[1]: False}
+    assert err.count("gpca explain: ") == 3
+    assert main([*words[:2], "lost.ply", "lost.ply", "--json-lines"]) == 2
+    assert capsys.readouterr().out == ""  # the target is no source
+
+
 PAIRS = """source, target, init, unit
 brick.stl,cone.ply,,mm
 lost.ply,cone.ply,,mm
@@ -203,6 +216,9 @@ def test_pairs_of_a_file_are_a_line_each_and_a_faulty_row_loses_no_other(folder,
     assert main(words) == 2
     out, err = capsys.readouterr()
     lines = [json.loads(line) for line in out.splitlines()]
+    assert next(line["error"] for line in lines if "error" in line).startswith("meshes/lost.ply: no such file")
+    assert len(lines) == 8
+    lines = [line for line in lines if "error" not in line]
     assert [(line["source"], line["target"]) for line in lines] == [("meshes/brick.stl", "meshes/cone.ply")] * 2
     assert main([*arguments("explain", {"--init": "meshes/pose.txt"})]) == 0
     assert json.loads(capsys.readouterr().out)["T_target_source"] == lines[1]["T_target_source"]
