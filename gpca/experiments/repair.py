@@ -304,12 +304,12 @@ def table20_parts(run: Run, intervals):
         part: show("repaired", f"{title} (%)", part, decimals=0) for part, title in parts.items()
     }
     sheet = Sheet("table20_parts", {"method": "Method"}, rows, columns, intervals)
-    failed = {title: sheet.samples(part) for part, title in parts.items()}
+    failed = {title: sheet.samples(part) for part, title in parts.items() if (0, part) in sheet.cells}
     return sheet.table(
         "Failed registrations that are repaired (%), by part" + run.stand_ins(),
         "part",
         (
-            f"{sheet.over()}. Failed: {', '.join(f'{title} {count}' for title, count in failed.items() if count)}.",
+            f"{sheet.over()}. Failed: {', '.join(f'{title} {count}' for title, count in failed.items())}.",
             "Rivals are accepted by their best tests, as in Table XX.",
         ),
         bold=columns,

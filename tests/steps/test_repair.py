@@ -3,14 +3,17 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from gpca.alignment.icp import ICPSettings
 from gpca.errors import InputError
-from gpca.experiments.repair import RIVAL, measured
+from gpca.experiments.repair import RIVAL, collect, mean_seconds, measured, table20_parts, table20_repair
+from gpca.io.csv_file import write_csv
 from gpca.reenactment.settings import ReenactmentSettings
-from gpca.steps.repair import NEVER, REPAIR, TESTS, Attempts, RepairSettings, World, searched, try_all
+from gpca.steps.repair import LIKELIEST, NEVER, REPAIR, TESTS, Attempts, RepairSettings, World, searched, try_all
 from gpca.steps.repair_verdicts import CAUSES, HARD, verdicts
+from tests.experiments.runs import run_with
 
 TOLERANCE = 0.03
 HYPOTHESES = ReenactmentSettings(hypotheses=2)
@@ -94,3 +97,16 @@ def test_the_tested_family_has_no_say_in_its_limits():
     before, after = (verdicts({CAUSES: [("tiny", 0, each)]}, TOLERANCE) for each in (one, spoiled))
     decided = [rows.loc[rows["cluster"] == "family 3", "replaced"].tolist() for rows in (before, after)]
     assert decided[0] == decided[1] and any(decided[0])
+
+
+def test_the_tables_show_every_track_and_part(tmp_path):
+    attempts = replace(drawn(0), method_M=np.array([LIKELIEST, "fgr"]))
+    rows = verdicts({CAUSES: [("ycb", 0, attempts)]}, TOLERANCE)
+    write_csv(tmp_path / "verdicts.csv", rows)
+    run = run_with()
+    numbers = collect(run, tmp_path / "verdicts.csv")
+    seconds = mean_seconds(pd.DataFrame({"method": [REPAIR, "fgr"], "seconds": [0.05, 0.1], "seed": 0}))
+    whole, parts = table20_repair(run, numbers, seconds), table20_parts(run, numbers)
+    assert whole.printed()["rows"][0][0][0] == "Causes" and len(whole.rows) == 5
+    assert {"pose", "some"} <= set(parts.columns) and "few" not in parts.columns
+    assert whole.cells[0, "lead"].mean > 0 and whole.cells[0, "ms"].mean == pytest.approx(50)
