@@ -137,15 +137,17 @@ def run_explain(options: Namespace) -> int:
     if path is None:
         from gpca.model.clouds import read_pose
         from gpca.model.scan_explainer import explain_scans
+        from gpca.model.scan_repair import repair_scans
 
         explain = partial(
-            explain_scans,
+            repair_scans if options.repairs_alone else explain_scans,
             voxel=options.voxel,
             method=options.method,
             limit=None if options.tolerance is None else _length(options.tolerance, options.unit),
             T_target_source=None if options.pose is None else read_pose(options.pose),
-            estimator=options.estimator or ("monte_carlo" if options.uncertainty else None),
         )
+        if options.estimator or options.uncertainty:
+            explain = partial(explain, estimator=options.estimator or "monte_carlo")
     else:
         from gpca.model.explainer import Explainer
         from gpca.model.file import Model

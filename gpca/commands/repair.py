@@ -6,7 +6,6 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from gpca.commands.explain import add_registration_arguments, run_explain
-from gpca.errors import InputError
 
 # What `explain` alone can do.
 LEFT_OUT = dict.fromkeys(("save_pose", "estimator", "png", "queue")) | {"uncertainty": False, "fast": False}
@@ -25,7 +24,4 @@ def run_repair(options: Namespace) -> int:
     Returns 0 if each is good or repaired, otherwise the largest status of `gpca.model.repaired.STATUSES`, or 2 if a row
     of the CSV has a fault.
     """
-    if options.scans:
-        remedy = "run 'gpca explain --scans --save-pose FILE', whose pose fits best, and judge it with --pose"
-        raise InputError("--scans", "is not for repair, which needs a whole target", remedy)
     return run_explain(options)

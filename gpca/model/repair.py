@@ -152,16 +152,38 @@ def decide(
     If none is called good, the fewest most probable poses of which one is right are given, if they are called good so.
     A lost registration, which ended away from the target, never stays.
     """
+
+    def of_set(rows: list[int]) -> float:
+        return float(judge.probability(proposals.set_of(rows), tolerance)[0])
+
     probability_n = judge.probability(proposals.evidence, tolerance)
-    if probability_n[0] < level.threshold and not lost:
+    failed_from = 0.0 if lost else level.threshold
+    return verdict_of(probability_n, proposals.weight_n, failed_from, level.good_below, of_set)
+
+
+def verdict_of(
+    probability_n: np.ndarray,
+    weight_n: np.ndarray,
+    failed_from: float,
+    good_below: float,
+    of_set: Callable[[list[int]], float],
+) -> Verdict:
+    """Return the verdict on a registered pose, the first, and others, by how probably each is off.
+
+    Args:
+        weight_n: probabilities of the hypotheses at the poses.
+        failed_from, good_below: probabilities from which the registered pose is called failed, and below which another
+            is called good.
+        of_set: probability that all poses of some rows are off.
+    """
+    if probability_n[0] < failed_from:
         return Verdict(GOOD, 0, (), probability_n)
-    below, best = level.good_below, 1 + int(probability_n[1:].argmin())
-    if probability_n[best] < below:
+    best = 1 + int(probability_n[1:].argmin()) if len(probability_n) > 1 else 0
+    if best and probability_n[best] < good_below:
         return Verdict(REPAIRED, best, (), probability_n)
-    offered = [row for row in np.argsort(-proposals.weight_n, kind="stable").tolist() if row]
-    offered = [row for row in offered if proposals.weight_n[row] >= LEAST_WEIGHT]
+    offered = [row for row in np.argsort(-weight_n, kind="stable").tolist() if row and weight_n[row] >= LEAST_WEIGHT]
     for count in range(2, len(offered) + 1):
-        if judge.probability(proposals.set_of(offered[:count]), tolerance)[0] < below:
+        if of_set(offered[:count]) < good_below:
             return Verdict(SEVERAL, 0, tuple(offered[:count]), probability_n)
     return Verdict(NOT_REPAIRED, 0, (), probability_n)
 

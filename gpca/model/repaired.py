@@ -209,7 +209,7 @@ class Repair(ExplainedRegistration):
         lines.append(f"result    probability {self.result:.2f} that the pose is off by more than {limit}{before}")
         if self.verdict == REPAIRED:
             lines.append(f"promise   {self._promise}")
-        if self.verdict != GOOD:
+        if self.outliers is not None:
             lines.append(f"seen      {self._seen}")
         if self.spread is not None:
             rotation, shift = in_decimals(self.spread.rotation_deg), in_decimals(self.spread.translation)
@@ -242,7 +242,7 @@ class Repair(ExplainedRegistration):
 
     @property
     def _seen(self) -> str:
-        outliers = f"{self.outliers or 0:.0%} of the source are outliers"
+        outliers = f"{self.outliers:.0%} of the source are outliers"
         if self.missing is None:
             return outliers
         side = side_in_words(self.missing.direction)

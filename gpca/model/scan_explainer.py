@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from scipy.special import expit
 
+from gpca.alignment.methods.interface import Outcome
 from gpca.alignment.pose_error import displacements
 from gpca.causes.policy import NOTHING, TREATMENTS
 from gpca.causes.truth import FAILED, NOMINAL
@@ -78,26 +79,8 @@ def explain_scans(
             too few points, a limit that is no length, unknown method or estimator, or missing package.
     """
     started = perf_counter()
-    T_given = None if T_target_source is None else np.array(T_target_source, np.float64)
-    T_init = T_target_source_init if T_target_source_init is not None or T_given is None else T_given
-    T_init = np.eye(4) if T_init is None else np.array(T_init, np.float64)
-    require_rigid(T_init, "initial pose")
-    notes: list[str] = []
-    source = in_unit(as_points(source_points, "source", notes), source_unit, unit)
-    clouds = {"source": source, "target": as_points(target_points, "target", notes)}
-    scans, frame = _prepared(clouds, T_init, unit, voxel, notes)
-    if limit is None:
-        most = max(LIMIT_M / meters_per(unit), LIMIT_VOXELS * scans.voxel * frame.diameter)
-        limit = min(most, LIMIT_SHARE * frame.diameter)
-    if not 0 < limit < np.inf:
-        raise InputError("limit", f"{limit:g} is no length", "give a positive one")
-    if T_given is not None:
-        require_rigid(T_given, "pose")
-        outcome = scans.outcome(frame.pose_inside(T_given @ inverse(T_init)))
-    else:
-        outcome = scans.registered() if method is None else scans.registered_by(method)
-    if outcome.failure:
-        notes.append(f"{method} failed: {outcome.failure}")
+    given = source_points, target_points, T_target_source_init, unit, voxel, method, source_unit, limit, T_target_source
+    scans, frame, T_init, outcome, limit, notes = registered_scans(*given)
     T_found, tolerance = outcome.T_target_source, limit / frame.diameter
     ranked = scans.poses(T_found, min(scans.voxel, tolerance / 2))
     enactments = [scans.enacted(pose, T_found) for pose in ranked]
@@ -109,7 +92,7 @@ def explain_scans(
     action, reason = decision(state, reenacted, overlap[0], causes)
     warning = f"only {overlap[0]:.0%} of the source lies on the target: wrong poses may fit as well as the right one"
     moved, spread = None, None
-    if T_given is None and T_target_source_init is not None:
+    if T_target_source is None and T_target_source_init is not None:
         moved = Motion.of(T_found, scans.source, frame.diameter)
     if estimator is not None:
         by = method or ("point_to_point" if scans.flat else "point_to_plane")
@@ -122,7 +105,7 @@ def explain_scans(
         T_target_source=frame.pose_outside(T_found) @ T_init,
         fitness=outcome.fitness,
         inlier_rmse=outcome.inlier_rmse * frame.diameter,
-        method=GIVEN if T_given is not None else method or scans.icp_name,
+        method=GIVEN if T_target_source is not None else method or scans.icp_name,
         voxel=scans.voxel * frame.diameter,
         state=state,
         failure=failure,
@@ -145,6 +128,44 @@ def explain_scans(
             truth=TRUTH,
         ),
     )
+
+
+def registered_scans(
+    source_points: Any,
+    target_points: Any,
+    T_target_source_init: np.ndarray | None,
+    unit: str,
+    voxel: float | None,
+    method: str | None,
+    source_unit: str | None,
+    limit: float | None,
+    T_target_source: np.ndarray | None,
+) -> tuple[Scans, CanonicalFrame, np.ndarray, Outcome, float, list[str]]:
+    """Return the thinned scans, the frame of the target, the initial pose, the registration, its limit, and notes.
+
+    The arguments are those of :func:`explain_scans`.
+    """
+    T_given = None if T_target_source is None else np.array(T_target_source, np.float64)
+    T_init = T_target_source_init if T_target_source_init is not None or T_given is None else T_given
+    T_init = np.eye(4) if T_init is None else np.array(T_init, np.float64)
+    require_rigid(T_init, "initial pose")
+    notes: list[str] = []
+    source = in_unit(as_points(source_points, "source", notes), source_unit, unit)
+    clouds = {"source": source, "target": as_points(target_points, "target", notes)}
+    scans, frame = _prepared(clouds, T_init, unit, voxel, notes)
+    if limit is None:
+        most = max(LIMIT_M / meters_per(unit), LIMIT_VOXELS * scans.voxel * frame.diameter)
+        limit = min(most, LIMIT_SHARE * frame.diameter)
+    if not 0 < limit < np.inf:
+        raise InputError("limit", f"{limit:g} is no length", "give a positive one")
+    if T_given is not None:
+        require_rigid(T_given, "pose")
+        outcome = scans.outcome(frame.pose_inside(T_given @ inverse(T_init)))
+    else:
+        outcome = scans.registered() if method is None else scans.registered_by(method)
+    if outcome.failure:
+        notes.append(f"{method} failed: {outcome.failure}")
+    return scans, frame, T_init, outcome, limit, notes
 
 
 def _reenacted(scans: Scans, enactments: Sequence[Enactment], T_found: np.ndarray) -> Reenacted:
@@ -183,13 +204,27 @@ def _prepared(
     return scans, frame
 
 
-def evidence_at(scans: Scans, poses: Sequence[PossiblePose], T_found: np.ndarray, limit: float) -> Evidence:
-    """Gather what speaks for a failure of a result, with a limit in units of the extent."""
-    at_result = scans.outcome(T_found)
+def weights_and_errors(
+    scans: Scans, poses: Sequence[PossiblePose], *T_results: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the probabilities (k,) of poses that may be true, and then the error of the nearest result."""
     weight_k = np.exp([pose.log_posterior - max(each.log_posterior for each in poses) for pose in poses])
-    error_k = [displacements((T_found @ inverse(pose.T))[None], scans.common(pose.T))[0] for pose in poses]
+    T_n = np.array(T_results)
+    error_k = [displacements(T_n @ inverse(pose.T), scans.common(pose.T)).min() for pose in poses]
+    return weight_k / weight_k.sum(), np.array(error_k)
+
+
+def evidence_at(
+    scans: Scans, poses: Sequence[PossiblePose], T_found: np.ndarray, limit: float, *T_also: np.ndarray
+) -> Evidence:
+    """Gather what speaks for a failure of a result, with a limit in units of the extent.
+
+    With further poses, it speaks for a failure of all of them.
+    """
+    at_result = scans.outcome(T_found)
+    weight_k, error_k = weights_and_errors(scans, poses, T_found, *T_also)
     log_error_k = np.log(np.hypot(error_k, OWN_ERROR * scans.voxel) / limit)
-    elsewhere = (weight_k * expit(STEEPNESS * log_error_k)).sum() / weight_k.sum()
+    elsewhere = (weight_k * expit(STEEPNESS * log_error_k)).sum()
     return Evidence(float(elsewhere), at_result.inlier_rmse / scans.voxel, at_result.fitness)
 
 

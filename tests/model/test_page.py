@@ -121,14 +121,16 @@ def test_an_explanation_and_its_scene_are_in_one_frame(explained, pair):
 
 
 @in_a_browser
-def test_a_browser_draws_every_view_and_has_nothing_to_complain_about(html, tmp_path):
+def test_a_browser_draws_every_view_and_has_nothing_to_complain_about(explained, tmp_path):
     choose = """<script>addEventListener("load", () => {
       for (const button of document.querySelectorAll("[data-view]")) button.click();
       document.querySelector('[data-view="what:0:3"]').click();
     });</script>"""
+    repaired = replace(explained, scene=replace(explained.scene, T_repaired=explained.scene.T_found))
     # The page's policy allows scripts that stand in it.
-    (tmp_path / "page.html").write_text(with_script(html, choose))
+    (tmp_path / "page.html").write_text(with_script(repaired.html(), choose))
     shown = chromium(tmp_path / "page.html", tmp_path / "profile", "--dump-dom", "--window-size=400,900")
     assert 'data-shown="what:0:3"' in shown
     assert "Re-enacted as if pose 1 were true, " in shown
+    assert "Repaired: the median distance to the target is " in shown
     assert "or more</span>" in shown

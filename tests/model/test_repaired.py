@@ -11,14 +11,16 @@ from scipy.spatial import cKDTree
 import gpca
 from gpca import Explainer
 from gpca.__main__ import main
+from gpca.alignment.pose_error import displacements
 from gpca.model.diagnosis import TAKE
 from gpca.model.repair import GOOD, NOT_REPAIRED, REPAIRED, SEVERAL, Part
 from gpca.model.repaired import STATUSES, side_in_words
 from gpca.model.result import Calibrated, ResultJudge
-from gpca.rigid import transform
+from gpca.rigid import inverse, transform
 
 from .test_judge import shifted
 from .test_page import scene_of
+from .test_scans import TRUE, room
 
 
 def judging(model, *calibrated):
@@ -143,12 +145,28 @@ def test_the_command_says_by_its_status_that_no_pose_is_settled(folder, wrong, c
     [
         (["--out", "source.npy"], "source.npy: is also an input or another output"),
         (["--init", "wrong.txt", "--out", "wrong.txt"], "wrong.txt: is also an input or another output"),
-        (["--scans"], "--scans: is not for repair, which needs a whole target"),
+        (["--scans"], "--model: is not for scans"),
     ],
 )
 def test_the_command_refuses(folder, words, fault, capsys):
     assert main([*folder, *words]) == 2
     assert capsys.readouterr().err.startswith(f"gpca repair: {fault}")
+
+
+def test_a_pose_between_scans_is_put_right_in_the_same_words(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    np.save("source.npy", transform(inverse(TRUE), room(0, 0.0, 0.8)))
+    np.save("target.npy", room(1, 0.2, 1.0))
+    np.savetxt("wrong.txt", shifted(1.5) @ TRUE)
+    words = ["repair", "source.npy", "target.npy", "--scans", "--pose", "wrong.txt", "--out", "T.txt", "--json"]
+    assert main(words) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["verdict"] == REPAIRED
+    assert said["result"] < 0.2 < said["registered_result"]
+    assert said["wrong"] is None
+    assert displacements((np.loadtxt("T.txt") @ inverse(TRUE))[None], np.load("target.npy"))[0] < 0.1
+    assert main([*words[:-1], "--pose", "T.txt", "--out", "again.txt", "--html", "page.html"]) == 0
+    assert capsys.readouterr().out.startswith("repair    good: ")
 
 
 def test_it_is_a_name_of_the_package(wrong, pair, monkeypatch, tmp_path):

@@ -1,0 +1,91 @@
+"""Puts the registration of two scans right, in the words of objects, and promises nothing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from gpca.model.diagnosis import CHECK
+from gpca.model.explanation import GIVEN, LEARNED
+from gpca.model.repair import verdict_of
+from gpca.model.repaired import ACTIONS, OtherPose, Repair, reason_of
+from gpca.model.scan_explainer import (
+    GOOD,
+    LEAST_OVERLAP,
+    SHOWN_REACH,
+    evidence_at,
+    failure_of,
+    registered_scans,
+    weights_and_errors,
+)
+from gpca.model.scene import Scene
+
+
+def repair_scans(
+    source_points: Any,
+    target_points: Any,
+    T_target_source_init: np.ndarray | None = None,
+    unit: str = "m",
+    voxel: float | None = None,
+    method: str | None = None,
+    source_unit: str | None = None,
+    limit: float | None = None,
+    T_target_source: np.ndarray | None = None,
+) -> Repair:
+    """Register a scan to a scan and, if the result may be wrong, put it right where another pose is called nominal.
+
+    The arguments are those of :func:`gpca.model.scan_explainer.explain_scans`.
+    """
+    started = perf_counter()
+    given = source_points, target_points, T_target_source_init, unit, voxel, method, source_unit, limit, T_target_source
+    scans, frame, T_init, outcome, limit, notes = registered_scans(*given)
+    T, tolerance = outcome.T_target_source, limit / frame.diameter
+    ranked = scans.poses(T, min(scans.voxel, tolerance / 2))
+    weight_k, _ = weights_and_errors(scans, ranked, T)
+    others = [(pose.T, float(weight)) for pose, weight in zip(ranked, weight_k, strict=True) if pose.T is not T]
+    T_n, weight_n = [T, *(pose for pose, _ in others)], np.array([0.0, *(weight for _, weight in others)])
+
+    def failure(rows: list[int]) -> float:
+        first, *also = (T_n[row] for row in rows)
+        failed = failure_of(evidence_at(scans, ranked, first, tolerance, *also))
+        return failed if scans.overlap(first)[0] >= LEAST_OVERLAP else max(failed, GOOD)
+
+    failure_n = np.array([failure([row]) for row in range(len(T_n))])
+    verdict = verdict_of(failure_n, weight_n, GOOD, GOOD, failure)
+    poses = []
+    for (pose, weight), failed in zip(others, failure_n[1:], strict=True):
+        expected = float((weight_k * weights_and_errors(scans, ranked, pose)[1]).sum())
+        more = {"off": float(failed), "differs": None, "differs_by": 0.0}
+        poses.append(OtherPose.of(pose, weight, expected, T, scans.coarse, **more).outside(frame, T_init))
+    if verdict.rows:
+        poses = [poses[row - 1] for row in verdict.rows]
+    T_used, T_registered = T_n[verdict.row], frame.pose_outside(T) @ T_init
+    at_pose = scans.outcome(T_used)
+    scene = Scene(scans.source, scans.target, T, frame, SHOWN_REACH * scans.voxel, tolerance)
+    return Repair(
+        T_target_source=poses[verdict.row - 1].T_target_source if verdict.row else T_registered,
+        T_registered=T_registered,
+        fitness=at_pose.fitness,
+        inlier_rmse=at_pose.inlier_rmse * frame.diameter,
+        method=GIVEN if T_target_source is not None else method or scans.icp_name,
+        verdict=verdict.name,
+        action=ACTIONS.get(verdict.name, CHECK),
+        reason=reason_of(verdict, poses, unit),
+        unit=unit,
+        tolerance=limit,
+        tolerance_share=tolerance,
+        registered_result=float(failure_n[0]),
+        result=float(failure_n[verdict.row]),
+        failed_from=GOOD,
+        good_below=GOOD,
+        poses=tuple(poses),
+        notes=tuple(notes),
+        learned_from=LEARNED,
+        seconds=perf_counter() - started,
+        scene=replace(
+            scene, T_repaired=T_used if verdict.row else None, T_others=tuple(T_n[row] for row in verdict.rows)
+        ),
+    )
