@@ -29,6 +29,7 @@ from gpca.explainers import interface
 from gpca.explainers.classifiers import boosted_trees, known_concepts, standardized_regression
 from gpca.explainers.gpca import DescriptorGPCA
 from gpca.explainers.interface import ExplainerEntry, Sees, attached
+from gpca.model.result import DEFAULT_TOLERANCE, Evidence, ResultJudge
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.distances import ENTROPY
 from gpca.pairs.perturbation import CONCEPTS
@@ -169,14 +170,31 @@ class AlignmentClassifier(Alarm):
             self._classifier.fit(described(registrations, self._sees, self._wanted), failed_N)
 
     def scores(self, registrations: Registrations) -> np.ndarray:
-        """Return scores (N, 4) with sum one; at a failure probability of 0.5, each cause equals nominal."""
         if self._constant is None:
             features_N_F = described(registrations, self._sees, self._wanted)
             failure_N = self._classifier.predict_proba(features_N_F)[:, 1]
         else:
             failure_N = np.full(len(registrations), self._constant)
-        scores_N_4 = np.column_stack([1 - failure_N, *(failure_N for _ in CONCEPTS)])
-        return scores_N_4 / scores_N_4.sum(axis=1, keepdims=True)
+        return even_scores(failure_N)
+
+
+class Result(Alarm):
+    """The judge of `gpca explain`: the probability that the registration itself is off by more than the tolerance."""
+
+    def fit(self, registrations: Registrations) -> None:
+        self._judge = ResultJudge.fit(self._evidence(registrations), attached(registrations, "error_shown"))
+
+    def scores(self, registrations: Registrations) -> np.ndarray:
+        return even_scores(self._judge.probability(self._evidence(registrations), DEFAULT_TOLERANCE))
+
+    def _evidence(self, registrations: Registrations) -> Evidence:
+        return Evidence.of(registrations, *(attached(registrations, name) for name in ("hypotheses", "weight")))
+
+
+def even_scores(failure_N: np.ndarray) -> np.ndarray:
+    """Return scores (N, 4) with sum one; at a failure probability of 0.5, each cause equals nominal."""
+    scores_N_4 = np.column_stack([1 - failure_N, *(failure_N for _ in CONCEPTS)])
+    return scores_N_4 / scores_N_4.sum(axis=1, keepdims=True)
 
 
 def alarm_entropies(sees: Sees, source: str, seed: int, inverse_regularisation: Positive = 1.0) -> AlignmentClassifier:
@@ -225,6 +243,7 @@ CAUSE_EXPLAINERS = {
     "pair_committee": entry("Committee on the pair", Committee, ALL),
     "pair_committee_clouds": entry(f"Committee on the pair, {WITHOUT}", Committee, CLOUDS),
     "reenact": _reenacted("Re-enactment (untrained)", Reenact),
+    "result": _reenacted("Judge of the result, as gpca explain", Result),
     "reenact_committee": _reenacted("Committee on the re-enactment", partial(Committee, REENACTMENT)),
 }
 for level, sight in LEVELS.items():

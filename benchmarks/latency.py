@@ -36,6 +36,7 @@ from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 from time import perf_counter
+from types import SimpleNamespace
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
@@ -219,8 +220,8 @@ def make_explainer(options: argparse.Namespace):
     gpc = GPC(CONCEPTS, GPCSettings(learning_rate=0.1, draws=options.draws), "benchmark", 0)
     gpc.fit(h_N_d, np.array([CONCEPTS[n % 3] for n in range(TRAINING)]))
     familiar = Familiarity.of(make_pair(options.points, "training", n)[:2] for n in range(TRAINING))
-    parts = (None, TrainedEncoder.of(encoder, settings), gpc, ICPSettings(), options.points, RecoveryPolicy())
-    model = Model(*parts, "ellipsoids", stand_in=True, familiar=familiar)
+    parts = (TrainedEncoder.of(encoder, settings), gpc, ICPSettings(), options.points, RecoveryPolicy())
+    model = Model(SimpleNamespace(levels=()), *parts, "ellipsoids", stand_in=True, familiar=familiar)
     return Explainer(model, device="cpu")
 
 

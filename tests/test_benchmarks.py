@@ -303,7 +303,6 @@ def test_settings_of_methods_are_compared_on_the_same_pairs(tmp_path, objects, r
 
 
 def test_results_of_unseen_families_are_judged_by_what_learned_and_was_calibrated_on_others():
-    from sklearn.metrics import roc_auc_score
 
     from benchmarks import results
     from gpca.model.diagnoser import TrainingSet
@@ -321,9 +320,6 @@ def test_results_of_unseen_families_are_judged_by_what_learned_and_was_calibrate
     assert found["auroc"] > 0.98
     assert found["false_alarms"] < 0.08
     assert (found["good"], found["families"]) == ((error_N <= 0.03).sum(), 8)
-    score_N, weights_2_N = np.round(random.random(n), 1), random.integers(0, 3, size=(2, n))
-    expected = [roc_auc_score(error_N > 0.03, score_N, sample_weight=weights_N) for weights_N in weights_2_N]
-    np.testing.assert_allclose(results.auroc(score_N, error_N > 0.03, weights_2_N), expected)
 
 
 def test_gpc_compares_equal_fits_and_ends_with_its_numbers(capsys):

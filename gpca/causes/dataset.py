@@ -15,6 +15,7 @@ from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 
 LABELS = (NOMINAL, *CONCEPTS)
+HIDDEN = ("causes", "error_shown")  # arrays attached to registrations that explainers learn from, and see of no other
 
 
 @dataclass(frozen=True)
@@ -96,14 +97,17 @@ def labels_of(truth: Truth) -> np.ndarray:
 def observed_only(registrations: Registrations) -> Registrations:
     """Registrations without anything that reveals what is wrong with them."""
     hidden = registrations.without_labels()
-    return replace(hidden, attached={name: array for name, array in hidden.attached.items() if name != "causes"})
+    return replace(hidden, attached={name: array for name, array in hidden.attached.items() if name not in HIDDEN})
 
 
 def labeled(causes: Causes) -> Registrations:
-    """Return what an explainer learns: labels as the concepts, and ``causes`` (S, 3) attached, 1 where each is one."""
+    """Return what an explainer learns: labels as the concepts, and what is `HIDDEN` from it later attached.
+
+    These are ``causes`` (S, 3), 1 where each is one, and ``error_shown`` (S,), diameters.
+    """
     shown = causes.registrations
-    attached = {**shown.attached, "causes": causes.truth.causes.astype(float)}
-    return replace(shown, concept=labels_of(causes.truth), attached=attached)
+    hidden = dict(zip(HIDDEN, (causes.truth.causes.astype(float), causes.error_shown), strict=True))
+    return replace(shown, concept=labels_of(causes.truth), attached={**shown.attached, **hidden})
 
 
 def with_label(causes: Causes) -> Registrations:

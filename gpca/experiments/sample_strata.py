@@ -137,7 +137,9 @@ def table9_strata(run: Run, strata):
     SECTION,
     "Table IX by the registration that is shown",
     """The truth is a mean over many starts, but an explainer is shown a single registration, which may be right where
-    the mean is not. Both are failures in their own right: of the pair, and of this registration.""",
+    the mean is not. Both are failures in their own right: of the pair, and of this registration. `gpca explain` says
+    of its result what the judge of the result says here; it learned from the errors that are shown, of other families,
+    the other explainers from the means.""",
     after="table9_strata",
     intervals="cause_intervals.csv",
 )

@@ -15,7 +15,6 @@ import numpy as np
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.icp import ICPSettings
 from gpca.causes.dataset import LABELS, Causes, labels_of
-from gpca.causes.descriptors import observed_pair
 from gpca.causes.settings import CauseSettings, Moved
 from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
 from gpca.classifier.settings import GPCSettings
@@ -210,10 +209,8 @@ class TrainingSet(Container):
     @classmethod
     def of(cls, causes: Causes, reenactments: Reenactments) -> TrainingSet:
         """Return the training set of one source."""
-        truth, distances = causes.truth, []
-        for row, T_K in enumerate(reenactments.T_model_observed):
-            pair = observed_pair(causes, row)
-            distances.append(ModelSurface(pair.model).errors(inverses(T_K @ pair.T_init)))
+        truth = causes.truth
+        evidence = Evidence.of(causes.registrations, reenactments.T_model_observed, reenactments.weight)
         return cls(
             features_N_F=reenactment_features(reenactments),
             label_N=labels_of(truth),
@@ -221,10 +218,10 @@ class TrainingSet(Container):
             causes_N_3=truth.causes,
             shown_error_N=causes.error_shown,
             family_N=causes.registrations.cluster,
-            distance_N_K=np.array(distances),
-            weight_N_K=reenactments.weight,
-            inlier_rmse_N=causes.inlier_rmse_runs[:, 0],
-            fitness_N=causes.fitness_runs[:, 0],
+            distance_N_K=evidence.distance_N_K,
+            weight_N_K=evidence.weight_N_K,
+            inlier_rmse_N=evidence.inlier_rmse_N,
+            fitness_N=evidence.fitness_N,
         )
 
     @property

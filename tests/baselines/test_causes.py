@@ -7,12 +7,13 @@ import pytest
 
 from baselines.gates import NominalThreshold
 from gpca.alignment.icp import ICPSettings
-from gpca.causes.dataset import LABELS, labeled
+from gpca.causes.dataset import HIDDEN, LABELS, labeled
 from gpca.causes.descriptors import COLUMNS, WIDTHS, describe_all
 from gpca.causes.settings import GROUPS, DescriptorSettings
 from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.errors import InputError
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module, explainers
+from gpca.rigid import inverse
 
 GPC = {"learning_rate": 0.1, "iterations": 60, "inducing": 8, "draws": 50}
 FAST = {
@@ -29,6 +30,17 @@ COMMITTEES = {"pair_committee", "pair_committee_clouds", "reenact_committee"}
 NAMES = sorted(set(explainers(CAUSES)) - COMMITTEES)
 
 
+def hypotheses(causes):
+    """The true pose of each, from the initial pose of the observed cloud to the model; and one far off."""
+    registrations, aside = causes.registrations, np.eye(4)
+    aside[0, 3] = 0.2
+    T_S = [
+        registrations.T_target_source("true", row) @ inverse(registrations.T_target_source("init", row))
+        for row in range(len(causes))
+    ]
+    return np.stack([T_S, aside @ T_S], axis=1)
+
+
 @pytest.fixture(scope="module")
 def seen(causes):
     """Registrations with labels, descriptors and an embedding that tells the labels apart."""
@@ -41,6 +53,7 @@ def seen(causes):
     read = {"embedding": embedding, "head_logits": embedding[:, :4], **descriptors.groups}
     exponentials = np.exp(embedding[:, :4])
     read |= {"verdict": exponentials / exponentials.sum(axis=1, keepdims=True), "reenactment": embedding}
+    read |= {"hypotheses": hypotheses(causes), "weight": np.tile([0.7, 0.3], (len(causes), 1))}
     registrations = replace(registrations, attached={**registrations.attached, **read})
     return registrations.subset(np.flatnonzero(registrations.concept != BORDERLINE))
 
@@ -57,15 +70,15 @@ def test_scores_are_over_the_labels_and_depend_on_nothing_but_what_the_entry_say
     assert first.concepts == LABELS
     assert first.scores_N_C.shape == (len(seen), 4)
     assert ((first.scores_N_C >= 0) & (first.scores_N_C <= 1)).all()
-    assert first.abstained_N.all() == name.startswith(("gate_", "alarm_"))
+    assert first.abstained_N.all() == name.startswith(("gate_", "alarm_", "result"))
     if name in ("gpca", "softmax_head", "concept_vectors", "pair_forest", "gpca_pair"):  # it learned these samples
         assert (first.predicted_N == seen.concept).mean() > 0.5
-    blind = {array: np.full_like(numbers, 7.0) for array, numbers in seen.attached.items() if array != "causes"}
-    blind["causes"] = seen.attached["causes"]
+    blind = {array: np.full_like(numbers, 7.0) for array, numbers in seen.attached.items()}
+    blind |= {array: seen.attached[array] for array in HIDDEN}
     for group, columns in (shown for part in entry.sees for shown in COLUMNS.get(part, {}).items()):
         blind[group][:, columns] = seen.attached[group][:, columns]
     if "reenactment" in entry.sees:
-        blind |= {array: seen.attached[array] for array in ("verdict", "reenactment")}
+        blind |= {array: seen.attached[array] for array in ("verdict", "reenactment", "hypotheses", "weight")}
     if entry.reads == "embeddings":
         blind |= {array: seen.attached[array] for array in ("embedding", "head_logits")}
     assert np.array_equal(explained(name, replace(seen, attached=blind)).scores_N_C, first.scores_N_C)
@@ -125,6 +138,15 @@ def test_a_gate_alarms_where_its_number_is_bad(seen):
     assert (np.diff(scores[order]) <= 1e-12).all()
     fitness = explained("gate_fitness", seen).scores_N_C[:, 0]
     assert (np.diff(fitness[np.argsort(seen.attached["motion"][:, 3], kind="stable")]) >= -1e-12).all()
+
+
+def test_the_judge_of_the_result_ranks_by_the_error_that_is_shown_and_learns_from_nothing_else(seen):
+    said = 1 - explained("result", seen).scores_N_C[:, 0]
+    off = seen.attached["error_shown"] > 0.03
+    assert off.any() and not off.all()
+    assert said[off].min() > said[~off].max()
+    other = replace(seen, concept=np.roll(seen.concept, 1))
+    assert np.array_equal(1 - explained("result", other).scores_N_C[:, 0], said)
 
 
 def test_every_kind_of_explainer_has_its_own_names():
