@@ -12,7 +12,7 @@ from gpca.causes.policy import NOTHING, QUEUE
 from gpca.causes.truth import ALL, FAILED, NOMINAL, shapley_values
 from gpca.evaluation.conformal import ALARM, GOOD, NOT_SURE
 from gpca.guarantee.guarantee import SEVERAL, Guarantee
-from gpca.model.undetermined import Undetermined, axis_in_words, undetermined_at
+from gpca.model.undetermined import Undetermined, axis_in_words, lying_on, undetermined_at
 from gpca.numerals import in_decimals
 from gpca.objects.bop import symmetric_turn
 from gpca.objects.canonical import CanonicalFrame
@@ -221,8 +221,11 @@ class Reenacted:
         """
         first = self.poses[0]
         T_k = [first.T_target_source] if first.registered else [first.T_target_source, T_result]
-        undetermined = undetermined_at(transform(T_k[0], observed), surface, self.noise, open_ends)
-        scale = find_scale(observed, T_k, surface, generator("diagnosis", "scale"))
+        placed = transform(T_k[0], observed)
+        near_N = lying_on(surface, placed, self.noise)
+        undetermined = undetermined_at(placed[near_N], surface, open_ends)
+        # Points beyond an open end say nothing of the scale.
+        scale = find_scale(observed[near_N] if open_ends else observed, T_k, surface, generator("diagnosis", "scale"))
         return replace(self, undetermined=undetermined, scale=scale)
 
     @property

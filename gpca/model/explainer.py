@@ -310,7 +310,7 @@ class Explainer:
     def _decided(self, diagnosis: Diagnosis, registered: bool) -> Decision:
         """Decide what to do about a wrong result: a better pose comes before the policy, unless that learns from it."""
         if (scale := diagnosis.reenacted.scale) and diagnosis.wrong_scale:
-            return Decision(RESCALE, "", f"{scale.words}: multiply its points by {1 / scale.factor:.3g}")
+            return Decision(RESCALE, "", scale.advice)
         causes, bad_start = diagnosis.causes, diagnosis.start >= diagnosis.start_threshold
         decision = self.policy.decide(np.array([*causes.values()]), diagnosis.bald, concepts=(*causes,))
         if self.policy is not self.model.policy or (bad_start and decision.action == QUEUE):

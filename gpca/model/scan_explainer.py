@@ -21,7 +21,7 @@ from gpca.alignment.pose_error import displacements
 from gpca.causes.policy import NOTHING, TREATMENTS
 from gpca.causes.truth import FAILED, NOMINAL
 from gpca.errors import InputError
-from gpca.model.diagnosis import CHECK, RERUN, Reenacted
+from gpca.model.diagnosis import CHECK, RERUN, RESCALE, Reenacted
 from gpca.model.explanation import GIVEN, NOT_SURE, Evidence, Motion, PoseSpread, ScanExplanation
 from gpca.model.scan_registration import TRUTH, PossiblePose, Scans, in_voxels, voxel_size
 from gpca.model.scene import Scene
@@ -90,6 +90,8 @@ def explain_scans(
     state = state_of(failure, overlap[0])
     causes = () if state == NOMINAL else causes_of(reenacted, limit)
     action, reason = decision(state, reenacted, overlap[0], causes)
+    if (scale := reenacted.scale) and scale.off and scale.error > limit:
+        state, causes, action, reason = FAILED, ("scale",), RESCALE, scale.advice
     warning = f"only {overlap[0]:.0%} of the source lies on the target: wrong poses may fit as well as the right one"
     moved, spread = None, None
     if T_target_source is None and T_target_source_init is not None:

@@ -112,14 +112,18 @@ class Undetermined:
         return [f"free      {'; '.join(deviations)}"] if deviations else []
 
 
-def undetermined_at(points: np.ndarray, surface: ModelSurface, noise: float, open_ends: bool = False) -> Undetermined:
-    """Return what is not determined of a pose that takes an observed cloud (N, 3) to a surface.
+def lying_on(surface: ModelSurface, points: np.ndarray, noise: float) -> np.ndarray:
+    """Return which points (N,) of (N, 3) lie on a surface, or all if hardly any does."""
+    near_N = surface.tree.query(points)[0] <= NEAR * np.hypot(surface.spacing, noise)
+    return near_N if near_N.sum() >= LEAST_POINTS else np.ones(len(points), bool)
+
+
+def undetermined_at(points: np.ndarray, surface: ModelSurface, open_ends: bool = False) -> Undetermined:
+    """Return what is not determined of a pose that takes observed points (N, 3) to a surface, on which they lie.
 
     With `open_ends`, the surface may go on where it was not seen.
     """
-    near_N = surface.tree.query(points)[0] <= NEAR * np.hypot(surface.spacing, noise)
-    kept = points[near_N] if near_N.sum() >= LEAST_POINTS else points
-    return Undetermined.of(Holder(surface.points, surface.tree, open_ends).freedom(kept))
+    return Undetermined.of(Holder(surface.points, surface.tree, open_ends).freedom(points))
 
 
 def elementary(twists_k_6: np.ndarray, metric_6_6: np.ndarray) -> list[np.ndarray]:

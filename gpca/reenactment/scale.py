@@ -54,6 +54,11 @@ class Scale:
         too = f"{self.factor:.3g} times too large" if self.factor > 1 else f"{1 / self.factor:.3g} times too small"
         return f"the source seems {too} for the target"
 
+    @property
+    def advice(self) -> str:
+        """What to do about a wrong scale."""
+        return f"{self.words}: multiply its points by {1 / self.factor:.3g}"
+
 
 def find_scale(
     observed: np.ndarray, T_k: Sequence[np.ndarray], surface: ModelSurface, random: np.random.Generator

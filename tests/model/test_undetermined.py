@@ -52,6 +52,14 @@ def test_a_wrong_scale_is_a_cause_and_the_advice_is_to_rescale(shipped, four, si
     assert "failed: scale" in said.html()
 
 
+def test_a_wrong_scale_is_a_cause_between_scans():
+    source, target = (10 * vase(3000, seed) for seed in (102, 103))
+    said = explain_scans(1.3 * source, target)
+    assert (said.state, said.causes, said.action) == ("failed", ("scale",), RESCALE)
+    assert said.reenacted.scale.factor == pytest.approx(1.3, rel=0.05)
+    assert explain_scans(source, target).reenacted.scale.factor == 1
+
+
 def test_flat_scans_are_not_measured_out_of_their_plane():
     from benchmarks.undetermined import flat_room
 
