@@ -101,7 +101,7 @@ def align_from_many(
     wide_distance: Positive = 0.25,
     correspondence_distance: float = CORRESPONDENCE_DISTANCE,
     max_iterations: int = MAX_ITERATIONS,
-    overlap: PositiveShare = 0.7,
+    overlap: PositiveShare = 0.9,
     points: Annotated[int, Bounds(minimum=FEWEST)] = 512,
     unit: Positive = 1.0,
 ) -> Outcome:
