@@ -95,7 +95,7 @@ def run_explain(options: Namespace) -> int:
     statuses, given = {0}, []
 
     @contextmanager
-    def told(source: object, target: object, place: str = "") -> Iterator[None]:
+    def its_line(source: object, target: object, place: str = "") -> Iterator[None]:
         """With lines of JSON, a fault of one source is its line, and the others go on."""
         try:
             yield
@@ -113,7 +113,7 @@ def run_explain(options: Namespace) -> int:
             require_format(each.source)
         read_target(options.target)
     for each in inputs:
-        with told(each.source, each.target):
+        with its_line(each.source, each.target):
             require_format(each.source)
             given.append((each, each.read(read_target)))
     if not given and not rows:
@@ -183,11 +183,11 @@ def run_explain(options: Namespace) -> int:
             _queue(options.queue, explainer, explanation, " to ".join(files.values()))
 
     for each, arguments in given:
-        with told(each.source, each.target):
+        with its_line(each.source, each.target):
             explain_one(each, arguments)
     for place, row in _with_progress(rows):
         source, target = (options.pairs.parent / (row.get(name) or "") for name in COLUMNS)
-        with told(source, target, f"{place}: "):
+        with its_line(source, target, f"{place}: "):
             each = inputs_in(row, options)
             explain_one(each, each.read(read_target))
     print(learned, file=sys.stderr)

@@ -25,6 +25,12 @@ def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
     return (read_surface(path, scale) for path in files_in(folder, entry.get("files"), SUFFIXES))
 
 
+def require_entry(entry: dict, folder: Path) -> None:
+    """Raise an InputError unless the files that the entry names are there; reads none."""
+    if entry.get("files"):
+        files_in(folder, entry["files"], SUFFIXES)
+
+
 def files_in(folder: str | Path, patterns: Sequence[str] | None, suffixes: Sequence[str]) -> list[Path]:
     """Return the files of a folder, sorted: the matches of the patterns, or all with one of the suffixes."""
     folder, formats = Path(folder), ", ".join(suffixes)

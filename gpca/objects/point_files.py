@@ -279,6 +279,12 @@ SUFFIXES = (".pcd", ".tar", ".tar.gz", ".tgz")
 READS_ARCHIVES = True  # only a few of the 600 views in a tar are read, so nothing is unpacked
 
 
+def require_entry(entry: dict, place: Path) -> None:
+    """Raise an InputError unless the files that the entry names are there; reads none."""
+    if entry.get("files") and place.is_dir():
+        files_in(place, entry["files"], SUFFIXES)
+
+
 def from_entry(entry: dict, place: Path) -> Iterator[Surface]:
     """Yield `views_per_instance` (default 6) views of each instance of a tar, or of the PCD files, spread evenly."""
     paths = [place] if place.is_file() else files_in(place, entry.get("files"), SUFFIXES)

@@ -68,6 +68,8 @@ def resolve(entry: dict, data_dir: str | None) -> dict:
             continue
         if not (folder.is_dir() or folder.is_file()):
             raise InputError(folder, "is neither a folder nor a file", "correct location in the config")
+        if folder.resolve() == Path(folder.resolve().anchor):
+            raise InputError(folder, "is the root of the file system", "name a folder of data in the config")
         if entry.get("location") or all(any(folder.glob(pattern)) for pattern in patterns):
             require_whole_if_ours(folder)
             if require_entry := getattr(module, "require_entry", None):

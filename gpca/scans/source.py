@@ -90,7 +90,9 @@ def npz_scenes(entry: ScanEntry, place: Path) -> Iterator[ScannedScene]:
     files = sorted(place.glob("*.npz")) if place.is_dir() else [place]
     if not files:
         raise InputError(place, "the folder has no npz file", "correct location")
-    listed = _read_pairs(files[0].parent / PAIRS)
+    listed = _read_pairs(pairs := files[0].parent / PAIRS)
+    if unknown := sorted(listed.keys() - {path.stem for path in pairs.parent.glob("*.npz")}):
+        raise InputError(pairs, f"names the scene '{unknown[0]}', of which there is no npz file", "remove its rows")
     for path in files:
         require_file(path, "no such file", "correct location", np.inf)
         # zipfile raises errors of many kinds for a damaged archive.
@@ -130,7 +132,10 @@ def _read_pairs(path: Path) -> dict[str, tuple[Known, ...]]:
         raise InputError(path, "column 'overlap' contains numbers above 1", "give shares from 0 to 1")
     listed: dict[str, dict[tuple[str, str], Known]] = {}
     for scene, target, source, share in rows[["scene", "target", "source", "overlap"]].itertuples(index=False):
-        listed.setdefault(scene, {})[target, source] = Known(target, source, float(share))
+        known = Known(target, source, float(share))
+        if target == source or listed.setdefault(scene, {}).setdefault((target, source), known) != known:
+            words = "pairs it with itself" if target == source else f"gives it two overlaps with {source}"
+            raise InputError(f"{path}, scan {target} of {scene}", words, "correct or remove a row")
     return {scene: tuple(pairs.values()) for scene, pairs in listed.items()}
 
 

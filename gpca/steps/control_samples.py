@@ -71,7 +71,7 @@ class ControlSettings:
     seeds: Count = 3
     draw_points: tuple[Points, Points] = (200, 512)
     folds: Annotated[int, Bounds(minimum=2, maximum=5)] = 3
-    bins: Annotated[int, Bounds(minimum=1, maximum=20)] = 4
+    bins: Annotated[int, Bounds(minimum=2, maximum=20)] = 4
 
     def __post_init__(self) -> None:
         if self.draw_points[0] > self.draw_points[1]:

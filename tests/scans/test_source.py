@@ -195,13 +195,27 @@ def test_npz(tmp_path, order):
 def test_pairs_beside_npz_files_are_those_that_count(tmp_path):
     write_npz(tmp_path / "floor.npz")
     write_npz(tmp_path / "other.npz")
-    rows = "list,scene,target,source,overlap\n3DMatch,floor,0,2,0.31\n3DLoMatch,floor,0,2,0.29\n3DMatch,floor,0,1,0.6\n"
+    rows = "list,scene,target,source,overlap\n3DMatch,floor,0,2,0.31\n3DLoMatch,floor,0,2,0.31\n3DMatch,floor,0,1,0.6\n"
     (tmp_path / "pairs.csv").write_text(rows)
     floor, other = npz_scenes(entry("npz"), tmp_path)
-    assert [(pair.target, pair.source, pair.overlap) for pair in floor.known()] == [("0", "2", 0.29), ("0", "1", 0.6)]
+    assert [(pair.target, pair.source, pair.overlap) for pair in floor.known()] == [("0", "2", 0.31), ("0", "1", 0.6)]
     assert len(list(other.known())) == 3
-    (tmp_path / "pairs.csv").write_text(rows.replace("0.31", "31"))
-    with pytest.raises(InputError, match=r"pairs.csv: column 'overlap' contains numbers above 1; give shares"):
+
+
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        ("floor,0,2,31", "column 'overlap' contains numbers above 1; give shares"),
+        ("floor,0,2,0.3", "scan 0 of floor: gives it two overlaps with 2"),
+        ("floor,1,1,0.3", "scan 1 of floor: pairs it with itself"),
+        ("flor,0,2,0.3", "names the scene 'flor', of which there is no npz file"),
+        ("floor,0,9,0.3", "lists a pair with scan '9'"),
+    ],
+)
+def test_pairs_that_contradict_the_scans_or_each_other_are_refused(tmp_path, row, message):
+    write_npz(tmp_path / "floor.npz")
+    (tmp_path / "pairs.csv").write_text(f"scene,target,source,overlap\nfloor,0,2,0.31\n{row}\n")
+    with pytest.raises(InputError, match=message):
         list(npz_scenes(entry("npz"), tmp_path))
 
 
