@@ -98,15 +98,6 @@ def learner(**settings):
 
 VALUES = [
     ({"controls": {"bins": 1}}, "controls.bins"),
-    (
-        {
-            "embedding": {"reduction": "umap"},
-            "reductions": {"umap": {"neighbours": 900}},
-            "registrations": {"train": 900},
-        },
-        "reductions.umap",
-        "900 neighbours are too many",
-    ),
     (source(location="/"), "sources.mine", "is the root of the file system"),
     (source(files=["*.none"]), "sources.mine", "*.none: no file matches"),
     # the run's own folder
