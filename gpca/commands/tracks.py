@@ -45,6 +45,10 @@ def run_bench(options: Namespace) -> None:
     if options.track == REPAIR:
         from gpca.tracks.repair import own_function, repair_table
 
+        for name in ("out", "settings", "learn_from", "data_dir"):
+            if getattr(options, name):
+                option = f"--{name.replace('_', '-')}"
+                raise InputError(option, f"is no option of the track {REPAIR}", "leave it out")
         function = own_function(options.method)
         samples = TrackSamples.of(TRACKS[CAUSES_TRACK], options.samples, options.processes)
         print(leaderboard.as_text(repair_table(samples, function, Path(options.method).stem)))

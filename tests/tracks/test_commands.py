@@ -41,6 +41,8 @@ def test_an_explainer_of_the_suite_can_be_run_again(published, run, apart, capsy
         (["causes", "none.py"], "none.py: no such file"),
         (["causes", "none_such"], "explainer 'none_such': unknown; choose one of "),
         (["hard", "my_method.py"], "my_method.py: lists no EXPLAINERS, whom the track hard asks; give it EXPLAINERS"),
+        (["repair", "my_method.py"], "my_method.py: has no function repair, which the track repair asks; give it def"),
+        (["repair", "my_method.py", "--out", "x.csv"], "--out: is no option of the track repair; leave it out"),
         (["clouds", "my_method.py"], "track 'clouds': unknown; choose one of causes, hard, frames"),
         (
             ["causes", "my_method.py", "--link", "javascript:alert(1)"],
