@@ -188,7 +188,8 @@ class Result(Alarm):
         return even_scores(self._judge.probability(self._evidence(registrations), DEFAULT_TOLERANCE))
 
     def _evidence(self, registrations: Registrations) -> Evidence:
-        return Evidence.of(registrations, *(attached(registrations, name) for name in ("hypotheses", "weight")))
+        enacted = (attached(registrations, name) for name in ("result_error", "weight"))
+        return Evidence(*enacted, registrations.inlier_rmse, registrations.fitness)
 
 
 def even_scores(failure_N: np.ndarray) -> np.ndarray:

@@ -58,6 +58,7 @@ class Candidate:
     T_init: np.ndarray  # and where a pose error starts
     severity: dict[str, float]  # small where not applied
     model_at_truth: np.ndarray | None = None  # (P, 3) where there is no pose error, if that changes the model's points
+    whole_model: np.ndarray | None = None  # (P, 3) without missing surface, if that changes the model's points
     toward_hidden: np.ndarray | None = None  # (3,) unit vector along which a half-space has cut the surface off
 
     @property
@@ -72,11 +73,14 @@ class Candidate:
 
     def reference(self, causes: tuple[int, ...]) -> np.ndarray:
         """Return the model's points with these of the applied causes."""
+        if self.whole_model is not None and OVERLAP not in causes:
+            return self.whole_model
         return self.model if POSE in causes or self.model_at_truth is None else self.model_at_truth
 
     def changing_reference(self, causes: tuple[int, ...]) -> tuple[int, ...]:
         """Return those of the causes that change :meth:`reference`: where they are the same, so are its points."""
-        return () if self.model_at_truth is None else tuple(cause for cause in causes if cause == POSE)
+        changing = {POSE: self.model_at_truth, OVERLAP: self.whole_model}
+        return tuple(cause for cause in causes if changing.get(cause) is not None)
 
     def icp(self, target: np.ndarray, causes: tuple[int, ...], settings: ICPSettings) -> MovingICP:
         """Return the ICP to a target, which has these of the applied causes."""
@@ -94,7 +98,8 @@ def draw_candidate(
 
     What is small where a cause is not applied is the same perturbation with a smaller severity: along the same axes,
     away from the same side. The number of points is that of what remains, so that it tells nothing about the surface
-    that is missing.
+    that is missing. Where the settings have partial models, overlap may be that the model lacks surface, with or
+    without that some is hidden in what was observed.
     """
     fewest, most = settings.points
     counts = np.exp(random.uniform(np.log(fewest), np.log(most), size=2)).round().astype(int)
@@ -119,9 +124,17 @@ def draw_candidate(
     T_near, T_init = (
         displacement(level["rotation_rad"] * axis, level["translation"] * direction) for level in (small, strong)
     )
+    whole_model = None
+    if settings.partial and random.random() < settings.partial and applied[OVERLAP]:
+        others = surface[np.concatenate([order[n_model + n_observed :], order[:n_model]])]
+        left = others[what_remains(others, random.uniform(*settings.lacking), random)]
+        whole_model, model = model, left[:n_model]
+        if random.random() < 0.5:
+            kept, severity["crop"] = seen, small["crop"]
     return Candidate(
         applied=applied,
         model=model,
+        whole_model=whole_model,
         clean=points + small["noise"] * jitter,
         noisy=np.where(is_outlier[:, None], anywhere, points + strong["noise"] * jitter),
         seen=seen,
@@ -131,6 +144,28 @@ def draw_candidate(
         severity=severity,
         toward_hidden=toward_hidden,
     )
+
+
+VIEWED_FROM = 3.0  # diameters; the distance of a sensor that sees one side
+FLIPPED = 100.0  # times the largest distance from it: the radius of the sphere that points are flipped at
+
+
+def what_remains(points: np.ndarray, lacking: float, random: np.random.Generator) -> np.ndarray:
+    """Return rows, in random order, of points (N, 3) in random order that a partial model has.
+
+    As often as not it lacks such a share of them, beyond a plane, or all that are hidden from one side (the hull of the
+    flipped points: Katz et al. 2007).
+    """
+    from scipy.spatial import ConvexHull
+
+    toward, of_one_side = random_direction(random), random.random() < 0.5
+    if not of_one_side:
+        return random.permutation(within_half_space(points @ toward, lacking, FEWEST_POINTS))
+    rays = points - VIEWED_FROM * toward
+    lengths = np.linalg.norm(rays, axis=1, keepdims=True)
+    flipped = rays + 2 * (FLIPPED * lengths.max() - lengths) * rays / lengths
+    hull = ConvexHull(np.concatenate([flipped, np.zeros((1, 3))])).vertices
+    return random.permutation(np.sort(hull[hull < len(points)]))
 
 
 def redrawn(candidate: Candidate, surface: np.ndarray, random: np.random.Generator) -> Candidate:

@@ -119,6 +119,8 @@ class CauseSettings(UncertaintySettings):
     test_objects: OpenShare = 0.3  # that only test samples show, at least one
     points: tuple[CloudPoints, CloudPoints] = (128, 1024)  # of the model, and of what is left of the observed cloud
     present: OpenShare = 0.5  # probability of each cause
+    partial: Share = 0.0  # of those without overlap, have a model that lacks surface
+    lacking: tuple[Hidden, Hidden] = (0.10, 0.50)  # share beyond a plane that it lacks; half lack what one side hides
     moved: Moved = MODEL  # onto the other cloud: the model lacks partners where surface is missing, the observed none
     severities: CauseSeverities = field(default_factory=CauseSeverities)
     small: Small = field(default_factory=Small)  # what there is of a cause that is not applied
@@ -129,7 +131,7 @@ class CauseSettings(UncertaintySettings):
     candidates: Calls = 20  # drawn for each sample that is wanted, at most
 
     def __post_init__(self) -> None:
-        for name in ("points", "several"):
+        for name in ("points", "several", "lacking"):
             low, high = getattr(self, name)
             if low > high:
                 raise InputError(f"causes {name}", f"[{low}, {high}] is in descending order", "swap the two")

@@ -148,7 +148,7 @@ class Diagnoser:
         row = row_of(enactments, pair, self.reenactment, self.truth)
         reenacted = Reenacted.of(enactments, row["weight"][: len(enactments)], T_icp, surface)
         reenacted = reenacted.with_fit(observed, T_icp, surface, open_ends=False)
-        distance_K = surface.errors(T_icp @ inverses(row["T_model_observed"]))
+        distance_K = enactments[0].errors(T_icp @ inverses(row["T_model_observed"]))
         evidence = Evidence(distance_K[None], row["weight"][None], pair.inlier_rmse_n[:1], pair.fitness_n[:1])
         return reenactment_features(Reenactments.of_rows([row], self.truth))[0], evidence, reenacted, enactments
 
@@ -210,7 +210,6 @@ class TrainingSet(Container):
     def of(cls, causes: Causes, reenactments: Reenactments) -> TrainingSet:
         """Return the training set of one source."""
         truth = causes.truth
-        evidence = Evidence.of(causes.registrations, reenactments.T_model_observed, reenactments.weight)
         return cls(
             features_N_F=reenactment_features(reenactments),
             label_N=labels_of(truth),
@@ -218,10 +217,10 @@ class TrainingSet(Container):
             causes_N_3=truth.causes,
             shown_error_N=causes.error_shown,
             family_N=causes.registrations.cluster,
-            distance_N_K=evidence.distance_N_K,
-            weight_N_K=evidence.weight_N_K,
-            inlier_rmse_N=evidence.inlier_rmse_N,
-            fitness_N=evidence.fitness_N,
+            distance_N_K=reenactments.result_error,
+            weight_N_K=reenactments.weight,
+            inlier_rmse_N=causes.registrations.inlier_rmse,
+            fitness_N=causes.registrations.fitness,
         )
 
     @property

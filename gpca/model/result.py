@@ -14,11 +14,7 @@ from scipy.special import expit, logit
 from gpca.causes.truth import LARGEST_ERROR
 from gpca.guarantee.guarantee import Guarantee
 from gpca.io.container import Container, array
-from gpca.pairs.dataset import Registrations
-from gpca.reenactment.enactment import Enactment
 from gpca.reenactment.settings import STEEPNESS
-from gpca.reenactment.surface import ModelSurface
-from gpca.rigid import inverse, inverses
 
 TOLERANCES = (0.01, 0.02, 0.03, 0.05, 0.1)  # diameters, at which it is trained and calibrated
 DEFAULT_TOLERANCE = 0.03
@@ -41,16 +37,6 @@ class Evidence(Container):
     inlier_rmse_N: np.ndarray = array("N")  # diameters
     fitness_N: np.ndarray = array("N")
 
-    @classmethod
-    def of(cls, registrations: Registrations, T_S_K: np.ndarray, weight_S_K: np.ndarray) -> Evidence:
-        """Return what is read of registrations, under hypotheses (S, K, 4, 4) from initial poses to the models."""
-        distances = []
-        for row, T_K in enumerate(T_S_K):
-            T_start = registrations.T_target_source("init", row) @ inverse(registrations.T_target_source("icp", row))
-            surface = ModelSurface(registrations.target(row).astype(np.float64))
-            distances.append(surface.errors(inverses(T_K @ T_start)))
-        return cls(np.array(distances), weight_S_K, registrations.inlier_rmse, registrations.fitness)
-
     def apart(self, tolerance: float) -> np.ndarray:
         """Return the weight (N,) of hypotheses that lie farther than the tolerance from the pose."""
         off_N_K = expit(STEEPNESS * np.log(np.maximum(self.distance_N_K, SMALLEST) / tolerance))
@@ -64,11 +50,6 @@ class Evidence(Container):
         constant_N = np.full(len(mean_N), np.log(tolerance))
         relative = [np.log(length_N / tolerance) for length_N in lengths]
         return np.column_stack([apart_N, *relative, self.fitness_N, constant_N])
-
-
-def distances(T_result: np.ndarray, enactments: Sequence[Enactment], surface: ModelSurface) -> np.ndarray:
-    """Return the error (K,) of a result (4, 4) under the hypotheses of its re-enactments."""
-    return surface.errors(T_result @ inverses(np.array([enactment.hypothesis.T for enactment in enactments])))
 
 
 @dataclass(frozen=True)

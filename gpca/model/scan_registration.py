@@ -263,7 +263,7 @@ class Scans:
     def enacted(self, pose: PossiblePose, T_found: np.ndarray) -> Enactment:
         """Register again with each subset of the causes, as if a pose were true; all of them gave the result."""
         T, few = pose.T, _drawn(self.source, RUN_POINTS, "runs")
-        hypothesis = Hypothesis(T, np.ones(len(few)), 0.0, self.voxel, 1.0, pose.log_posterior)
+        hypothesis = Hypothesis(T, np.ones(len(few)), 0.0, self.voxel, 1.0, pose.log_posterior, np.zeros(len(few)))
         scans = vars(cropped(hypothesis, few, self._surface, self._noise_scale))
         candidate = VoxelCandidate(**scans, normals=self._normals[1], voxel=self.voxel)
         errors = OverlapErrors(candidate.clean[candidate.seen], 1.0)
@@ -277,7 +277,7 @@ class Scans:
                 T_n = registrar.run(causes, nothing).T_target_source_n
                 error_of[causes] = float(capped(errors(inverses(T_n)))[0])
             error_8[b] = error_of[causes]
-        return Enactment(hypothesis, candidate, error_8, np.zeros(len(SUBSETS)), 0.0)
+        return Enactment(hypothesis, candidate, error_8, np.zeros(len(SUBSETS)), errors, 0.0)
 
     def _upright(self, T: np.ndarray) -> bool:
         """Whether a pose leaves the plane of flat scans in place, not turned over."""

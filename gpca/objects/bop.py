@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -134,24 +134,27 @@ def require_symmetries(listed: Mapping[str, Any], subject: str) -> None:
         finite_numbers(offset, 3, place, "offset", REMEDY)
 
 
-def find_symmetries(points_N_3: np.ndarray, diameter: float) -> dict[str, list]:
+def find_symmetries(
+    points_N_3: np.ndarray, diameter: float, distances: Callable | None = None, limit: float = TOLERANCE
+) -> dict[str, list]:
     """Return the turns about the axes of the bounding box that leave the shape unchanged, as BOP writes them.
 
-    After one, the mean distance from a point to its nearest neighbor exceeds the spacing of the points by at most
-    `TOLERANCE` diameters. On their scans, this finds the two symmetric objects of LINEMOD. Shape alone counts: a
-    printed can is symmetric. The cloud is whole and centered. Only keys with entries are returned.
+    After one, the mean distance of the points from the surface is at most `limit` diameters. Without `distances` of
+    points (N, 3), it is that to the nearest neighbor, and may exceed the limit by the spacing of the points. On their
+    scans, this finds the two symmetric objects of LINEMOD. Shape alone counts: a printed can is symmetric. The cloud is
+    whole and centered. Only keys with entries are returned.
     """
     from scipy.spatial import cKDTree
     from scipy.spatial.transform import Rotation
 
     points_N_3 = np.asarray(points_N_3[:SOUGHT_POINTS], np.float64)
-    tree = cKDTree(points_N_3)
-    spacing = tree.query(points_N_3, k=2)[0][:, 1].mean()
-    limit = TOLERANCE * diameter + spacing
+    if distances is None:
+        tree = cKDTree(points_N_3)
+        limit = limit * diameter + tree.query(points_N_3, k=2)[0][:, 1].mean()
 
     def fits(axis: np.ndarray, angle_deg: float) -> bool:
         turned = Rotation.from_rotvec(np.deg2rad(angle_deg) * axis).apply(points_N_3)
-        return tree.query(turned)[0].mean() < limit
+        return (distances(turned) if distances else tree.query(turned)[0]).mean() < limit
 
     continuous, discrete = [], []
     for axis in np.eye(3):

@@ -24,7 +24,7 @@ from gpca.process.progress import progress
 from gpca.reenactment.enactment import Enactment, reenact
 from gpca.reenactment.hypotheses import weights_of
 from gpca.reenactment.settings import SMALLEST_ERROR, STEEPNESS, ReenactmentSettings
-from gpca.rigid import transform
+from gpca.rigid import inverses, transform
 
 
 def verdict(error_S_K_8: np.ndarray, weight_S_K: np.ndarray, limits: Limits) -> np.ndarray:
@@ -70,6 +70,7 @@ class Reenactments(Container):
     T_model_observed: np.ndarray = array("S K 4 4")
     error: np.ndarray = array(f"S K {len(SUBSETS)}")
     uncertainty: np.ndarray = array(f"S K {len(SUBSETS)}")
+    result_error: np.ndarray = array("S K")  # of the pose that registration found, were a hypothesis true; diameters
     measured: np.ndarray = array(f"S K {len(MEASURED)}")
     described: np.ndarray = array(f"S {sum(WIDTHS[group] for group in DESCRIBED)}")
     verdict: np.ndarray = array(f"S {len(LABELS)}")
@@ -122,6 +123,8 @@ def row_of(
         to_result = displacements((hypothesis.T @ pair.T_init)[None], pair.observed)[0]
         numbers = (hypothesis.log_likelihood, hypothesis.width, hypothesis.covered)
         measured.append((*numbers, *(severity[name] for name in ("noise", "outliers", "crop")), to_start, to_result))
+    T_result_K = inverses(np.array([enactment.hypothesis.T @ pair.T_init for enactment in enactments]))
+    result_error_K = [each.errors(T[None])[0] for each, T in zip(enactments, T_result_K, strict=True)]
     most = settings.hypotheses
     rows_K = np.where(np.arange(most) < len(enactments), np.arange(most), 0)
     return {
@@ -129,6 +132,7 @@ def row_of(
         "T_model_observed": np.array([enactment.hypothesis.T for enactment in enactments])[rows_K],
         "error": np.array([enactment.error_8 for enactment in enactments])[rows_K],
         "uncertainty": np.array([enactment.uncertainty_8 for enactment in enactments])[rows_K],
+        "result_error": np.array(result_error_K)[rows_K],
         "measured": np.array(measured)[rows_K],
         "described": np.concatenate([*describe_plainly(pair, truth.icp).values()]),
     }

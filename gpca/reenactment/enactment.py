@@ -27,6 +27,7 @@ from gpca.seeds import generator
 NOISES = np.array([0.0, 0.01, 0.02, 0.03, 0.045, 0.06, 0.08, 0.11])  # diameters, that are simulated
 SIMULATED = 512  # points, at least
 FEWEST_INLIERS = 16
+FAR = 2.0  # widths of the mixture from the model's surface, from which a point may be where it lacks some
 QUIET = 0.004  # diameters; noise that is no larger is none
 
 
@@ -55,6 +56,7 @@ class Observation:
 
     points: np.ndarray
     is_outlier: np.ndarray  # (N,)
+    is_lone: np.ndarray  # (N,) which lie on surface that the model lacks
     noise: float  # standard deviation per axis, diameters
     residuals: np.ndarray  # (N,) signed distance from the plane of the nearest model point,
     rows: np.ndarray  # (N,) and that point
@@ -76,12 +78,17 @@ def observe(
     if (~is_outlier).sum() < FEWEST_INLIERS:
         is_outlier = np.ones(len(points), bool)
         is_outlier[np.argsort(-hypothesis.inlier_N, kind="stable")[:fewest]] = False
+    is_lone = ~is_outlier & (hypothesis.lone_N > 0.5) & (surface.distances(points) > FAR * hypothesis.width)
+    matched = ~is_outlier & ~is_lone
+    if matched.sum() < FEWEST_INLIERS:
+        is_lone, matched = np.zeros(len(points), bool), ~is_outlier
     residuals, rows = surface.residuals(points)
-    noise = scale.noise(residuals[~is_outlier])
-    covered = covered_points(surface.points, points[~is_outlier], noise, random)
-    return Observation(points, is_outlier, noise, residuals, rows, covered)
+    noise = scale.noise(residuals[matched])
+    covered = covered_points(surface.points, points[matched], noise, random)
+    return Observation(points, is_outlier, is_lone, noise, residuals, rows, covered)
 
 
+LEAST_LACKING = 0.05  # share of the points on surface that the model lacks; fewer are none
 FEW_OUTLIERS = 0.01  # share of the points; fewer are none
 MOST_ADDED = 1024  # points
 BESIDE = 0.6  # of the spacing: so far from a model's point, in its plane, a fresh point may lie
@@ -91,8 +98,9 @@ def rebuild(T: np.ndarray, observation: Observation, surface: ModelSurface, rand
     """Return the pair as a candidate of the truth: what was observed is its noisy cloud, of which a part is kept.
 
     Noise is taken away by moving each point to its plane, as far as the noise exceeds the roughness of the planes;
-    outliers become fresh points. Missing surface is filled with fresh points, as dense as the rest and as noisy. `T` is
-    the hypothesis: it takes what was observed to the model.
+    outliers become fresh points. Missing surface is filled with fresh points, as dense as the rest and as noisy, and
+    surface that the model lacks with the points that were observed there. `T` is the hypothesis: it takes what was
+    observed to the model.
     """
     noise, missing = observation.noise, float(1 - observation.covered.mean())  # of the model
     quiet = noise <= QUIET and observation.outliers < FEW_OUTLIERS
@@ -100,18 +108,20 @@ def rebuild(T: np.ndarray, observation: Observation, surface: ModelSurface, rand
     covered, absent = np.flatnonzero(observation.covered), np.flatnonzero(~observation.covered)
     if not quiet:
         if noise > QUIET:
-            moved = noise**2 / (noise**2 + surface.roughness) * observation.residuals
+            moved = noise**2 / (noise**2 + surface.roughness) * observation.residuals * ~observation.is_lone
             clean = clean - moved[:, None] * surface.normals[observation.rows]
         fresh = fresh_points(surface, covered, len(clean), random)
         clean = np.where(observation.is_outlier[:, None], fresh, clean)
-    count = min(MOST_ADDED, round(len(clean) * missing / (1 - missing)))
+    count = min(MOST_ADDED, round((~observation.is_lone).sum() * missing / (1 - missing)))
+    lacking = observation.is_lone.mean() >= LEAST_LACKING
     added = fresh_points(surface, absent, count, random) if count else np.empty((0, 3))
     jitter, anywhere = random.normal(size=added.shape), random.uniform(-0.5, 0.5, size=added.shape)
     scattered = random.random(count) < observation.outliers
     noisy = np.where(scattered[:, None] & (not quiet), anywhere, added + (noise > QUIET) * noise * jitter)
     return Candidate(
-        applied=np.array([not quiet, True, count > 0]),  # noise, pose, overlap
+        applied=np.array([not quiet, True, count > 0 or lacking]),  # noise, pose, overlap
         model=surface.points,
+        whole_model=np.concatenate([surface.points, clean[observation.is_lone]]) if lacking else None,
         clean=np.concatenate([clean, added]),
         noisy=np.concatenate([observation.points, noisy]),
         seen=np.arange(len(clean) + count),
@@ -137,6 +147,7 @@ class Enactment:
     candidate: Candidate  # its severities are what the hypothesis says of noise, outliers and crop
     error_8: np.ndarray  # v̂ and
     uncertainty_8: np.ndarray  # û of every subset of the causes, as in :class:`gpca.causes.truth.Truth`
+    errors: Callable[[np.ndarray], np.ndarray]  # of poses (n, 4, 4) where the identity is right, diameters
     icp_seconds: float  # that the registrations took
 
     @cached_property
@@ -148,17 +159,22 @@ class Enactment:
 def reenact(
     pair: ObservedPair, settings: ReenactmentSettings, truth: CauseSettings, surface: ModelSurface | None = None
 ) -> list[Enactment]:
-    """Find hypotheses of the true pose and enact each, the most probable first."""
+    """Find hypotheses of the true pose and enact each, the most probable first.
+
+    Errors are up to the symmetries of the model, which what was observed under the first hypothesis completes.
+    """
     surface = surface or ModelSurface(pair.model)
     before = transform(pair.T_init, pair.observed)
     T_found_n = pair.T_runs @ inverse(pair.T_init)
     random = generator(*pair.axes, "hypotheses")
     hypotheses = find_hypotheses(before, surface, T_found_n, settings, random)
-    scale, enactments = NoiseScale(surface, random), []
+    scale, enactments, whole = NoiseScale(surface, random), [], surface
     for hypothesis in hypotheses:
         observation = observe(before, hypothesis, surface, scale, random)
+        if not enactments and observation.is_lone.mean() >= LEAST_LACKING:
+            whole = surface.completed(observation.points[observation.is_lone], observation.noise)
         candidate = rebuild(hypothesis.T, observation, surface, random)
-        enactments.append(enact(hypothesis, candidate, surface.errors, pair.axes, truth))
+        enactments.append(enact(hypothesis, candidate, whole.errors, pair.axes, truth))
     return enactments
 
 
@@ -179,4 +195,4 @@ def enact(
     for subset in range(len(SUBSETS)):
         with suppress(Unmeasurable):
             error_8[subset], uncertainty_8[subset] = measured.error(subset), measured.uncertainty(subset)
-    return Enactment(hypothesis, candidate, error_8, uncertainty_8, perf_counter() - started)
+    return Enactment(hypothesis, candidate, error_8, uncertainty_8, errors, perf_counter() - started)

@@ -116,10 +116,11 @@ def find_frame_hypotheses(
 
     def fit(T: np.ndarray, observed: np.ndarray, pixels: int, rounds: int, anchor: Anchor | None) -> Hypothesis:
         """Return the pose that explains the observed points best, near another; each round looks at the side anew."""
+        nothing = np.zeros(len(observed))
         for _ in range(rounds):
             side, share = view.side(T, pixels)
             if len(side) < FEWEST_POINTS:
-                return Hypothesis(T, np.zeros(len(observed)), 0.0, LARGEST_WIDTH, 0.0, IMPOSSIBLE)
+                return Hypothesis(T, nothing, 0.0, LARGEST_WIDTH, 0.0, IMPOSSIBLE, nothing)
             spacing = float(np.median(cKDTree(side).query(side, 2)[0][:, 1]))
             fits = Mixture(side, spacing / 2).fit(observed, T[None], ITERATIONS, anchor=anchor)
             T = fits.T_n[0]
@@ -128,7 +129,8 @@ def find_frame_hypotheses(
         density = (1 - outliers) * np.log(max(share, search.LEAST_COVERED))
         log_posterior = min(len(observed), search.INDEPENDENT) * (likelihood - density) + search.log_prior(T, settings)
         log_posterior -= MISSING * (1 - share)
-        return Hypothesis(T, fits.inlier_n_N[0], likelihood, float(fits.width_n[0]), share, float(log_posterior))
+        width = float(fits.width_n[0])
+        return Hypothesis(T, fits.matched_n_N[0], likelihood, width, share, float(log_posterior), fits.lone_n_N[0])
 
     def best(T_n: np.ndarray, observed: np.ndarray, pixels: int, rounds: int, apart: float) -> list[Hypothesis]:
         begun = [*((T, None) for T in T_n), (np.eye(4), search.anchor_of(len(observed), settings))]

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.icp import ICPSettings, clipped_cost
-from gpca.reenactment.mixture import Anchor, Fits, Mixture
+from gpca.reenactment.mixture import Anchor, Fits, Mixture, densities_of
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface, share_within
 from gpca.rigid import inverses, rigid_motion, rotate, rotation_angle_rad, transform
@@ -65,6 +65,7 @@ NEGLIGIBLE = 4.5  # nats below the best hypothesis
 LEAST_COVERED = 0.2  # share of the model
 FEWEST_INLIERS = 8
 
+
 Evidence = Callable[[np.ndarray, float], float]  # pose (4×4), width of the normals -> nats of the posterior
 
 
@@ -78,6 +79,7 @@ class Hypothesis:
     width: float  # of the mixture's normals, diameters per axis
     covered: float  # share of the model that was observed, at most
     log_posterior: float  # tempered, up to a constant
+    lone_N: np.ndarray  # probability of each observed point to lie on surface that the model lacks
 
 
 def find_hypotheses(
@@ -95,12 +97,17 @@ def find_hypotheses(
     """
     few, few_model = observed[np.sort(random.permutation(len(observed))[:FITTED])], surface.points[:FITTED_MODEL]
     few_spacing = surface.spacing * np.sqrt(len(surface.points) / len(few_model))
-    some = few, Mixture(few_model, few_spacing / 2), ITERATIONS
-    every = observed, Mixture(surface.points, surface.spacing / 2), LAST_ITERATIONS
+    some = few, Mixture(few_model, few_spacing / 2), ITERATIONS, densities_of(few, few_model)
+    every = (
+        observed,
+        Mixture(surface.points, surface.spacing / 2),
+        LAST_ITERATIONS,
+        densities_of(observed, surface.points),
+    )
 
-    def fit(fitted: tuple[np.ndarray, Mixture, int], T_n: np.ndarray, **options: Any) -> list[Hypothesis]:
-        points, mixture, iterations = fitted
-        fits = mixture.fit(points, T_n, iterations, **options)
+    def fit(fitted: tuple[np.ndarray, Mixture, int, np.ndarray], T_n: np.ndarray, **options: Any) -> list[Hypothesis]:
+        points, mixture, iterations, densities = fitted
+        fits = mixture.fit(points, T_n, iterations, densities=densities, **options)
         return [_hypothesis(fits, i, points, surface, settings, random, evidence) for i in range(len(T_n))]
 
     free = fit(some, search_ends(observed, surface, T_found_n, random))
@@ -148,7 +155,9 @@ def hypothesis_at(
 ) -> Hypothesis:
     """Return a pose, as in :func:`find_hypotheses`, with the width and the outliers that are most likely there."""
     mixture = Mixture(surface.points, surface.spacing / 2)
-    fits = mixture.fit(observed, T[None], LAST_ITERATIONS, moving=False)
+    fits = mixture.fit(
+        observed, T[None], LAST_ITERATIONS, moving=False, densities=densities_of(observed, surface.points)
+    )
     return _hypothesis(fits, 0, observed, surface, settings, random, None)
 
 
@@ -177,19 +186,20 @@ def _hypothesis(
     random: np.random.Generator,
     evidence: Evidence | None,
 ) -> Hypothesis:
-    T, inlier_N, width = fits.T_n[i], fits.inlier_n_N[i], float(fits.width_n[i])
+    T, matched_N, width = fits.T_n[i], fits.matched_n_N[i], float(fits.width_n[i])
     seen = transform(T, observed)
-    if (inlier_N > 0.5).sum() >= FEWEST_INLIERS:
-        seen = seen[inlier_N > 0.5]
+    if (matched_N > 0.5).sum() >= FEWEST_INLIERS:
+        seen = seen[matched_N > 0.5]
     # The width is that of the noise and of the gaps between the model's points.
     covered = share_within(surface.points, seen, 0.7 * width, random)
     # Points of the part that was seen are the denser, the smaller it is.
-    density = (1 - fits.outliers_n[i]) * np.log(max(covered, LEAST_COVERED))
+    denser = float(np.log1p(matched_N * (1 / max(covered, LEAST_COVERED) - 1)).mean())
     likelihood = float(fits.log_likelihood_n[i])
-    log_posterior = min(len(observed), INDEPENDENT) * (likelihood - density) + log_prior(T, settings)
+    log_posterior = min(len(observed), INDEPENDENT) * (likelihood + denser) + log_prior(T, settings)
     if evidence is not None:
         log_posterior += evidence(T, width)
-    return Hypothesis(T, inlier_N, likelihood, width, covered, float(log_posterior))
+    lone_N = fits.lone_n_N[i]
+    return Hypothesis(T, matched_N + lone_N, likelihood, width, covered, float(log_posterior), lone_N)
 
 
 def log_prior(T: np.ndarray, settings: ReenactmentSettings) -> float:

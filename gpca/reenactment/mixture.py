@@ -11,8 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gpca.reenactment.mixture_kernels import FIRST_WIDTH, fit_all
+from gpca.reenactment.mixture_kernels import FIRST_WIDTH, fit_all, densities_among
 
+LEVELS = 9  # of widths at which the densities of the observed points are known, each √½ of the last
 CELL = 0.15  # diameters; edge of the cubes that the model's points are sorted into
 
 
@@ -38,7 +39,8 @@ class Fits:
     log_likelihood_n: np.ndarray  # mean over the points, nats
     width_n: np.ndarray  # of the normals, standard deviation per axis
     outliers_n: np.ndarray  # share
-    inlier_n_N: np.ndarray  # probability of each point to be no outlier
+    matched_n_N: np.ndarray  # probability of each point to lie on the model's surface
+    lone_n_N: np.ndarray  # and on surface that the model lacks
 
 
 class Mixture:
@@ -62,21 +64,36 @@ class Mixture:
         moving: bool = True,
         anchor: Anchor | None = None,
         width_n: np.ndarray | None = None,
+        densities: np.ndarray | None = None,
     ) -> Fits:
         """Maximize the likelihood of the observed points (N, 3) from each pose (n, 4, 4), times that of an anchor.
 
         A fit that has converged takes fewer iterations. Where poses are not moving, the width and the share of outliers
         are estimated there. The normals are `width_n` wide at first, by default `FIRST_WIDTH`.
+        With the densities of the observed points (:func:`densities_of`), the model may lack surface.
         """
         poses_n, n = np.array(T_n, np.float64), len(T_n)
-        likelihood_n, outliers_n = np.empty(n), np.empty(n)
+        likelihood_n, outliers_n = np.empty((2, n))
         width_n = np.full(n, FIRST_WIDTH) if width_n is None else width_n
         variance_n = np.maximum(np.square(width_n, dtype=np.float64), self._least)
-        inlier_n_N = np.empty((n, len(observed)))
+        matched_n_N, lone_n_N = np.empty((2, n, len(observed)))
         precision, arm = (anchor.strength / anchor.translation**2, anchor.arm) if anchor else (0.0, 0.0)
         fit_all(
             *(np.ascontiguousarray(observed, np.float64), poses_n, iterations, moving, precision, arm, self._least),
             *(self._points_3_M, self._starts, self._low, CELL, self._cells),
-            *(likelihood_n, variance_n, outliers_n, inlier_n_N),
+            np.empty((0, len(observed))) if densities is None else densities,
+            *(likelihood_n, variance_n, outliers_n, matched_n_N, lone_n_N),
         )
-        return Fits(poses_n, likelihood_n, np.sqrt(variance_n), outliers_n, inlier_n_N)
+        return Fits(poses_n, likelihood_n, np.sqrt(variance_n), outliers_n, matched_n_N, lone_n_N)
+
+
+def densities_of(observed: np.ndarray, model: np.ndarray) -> np.ndarray:
+    """Return how dense (LEVELS, N) surface that the model (M, 3) lacks is at observed points, for :meth:`Mixture.fit`.
+
+    It is as dense as the observed points (N, 3) are around each other, and on average no denser than the model: where
+    little of an object is observed, its points are dense.
+    """
+    density_L_N, typical = (np.zeros((LEVELS, len(points))) for points in (observed, model))
+    for points, densities in ((observed, density_L_N), (model, typical)):
+        densities_among(np.ascontiguousarray(points, np.float64), densities)
+    return density_L_N * np.minimum(1.0, typical.mean(axis=1) / np.maximum(density_L_N.mean(axis=1), 1e-9))[:, None]

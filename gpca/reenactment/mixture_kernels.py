@@ -10,6 +10,7 @@ from gpca.process.compilation import INNER_LOOP, njit
 REACH = 14.0  # squared distance, in variances, beyond which a partner's weight of e⁻⁷ counts as none
 FIRST_WIDTH, LARGEST_WIDTH = 0.03, 0.12  # diameters, standard deviation per axis
 FIRST_OUTLIERS, FEWEST_OUTLIERS, MOST_OUTLIERS = 0.05, 0.01, 0.2
+UNMATCHED = 0.25  # share of the points whose surface the model may lack, beforehand
 STILL = 1e-5  # change of a pose's largest entry, and
 SETTLED = 1e-3  # of the variance relative to it, at which a fit has converged
 # e⁻ᵗ for 0 <= t <= 7 is the eighth power of a polynomial around the middle of the eighths, within 1e-10 of it.
@@ -17,10 +18,37 @@ MIDDLE = REACH / 32
 AT_MIDDLE = float(np.exp(-MIDDLE))
 
 
-@njit(ahead="d2 d3 l ? d d d d2 l1 d1 d l1 d1 d1 d1 d2", cache=True, error_model="numpy")
+@njit(ahead="d2 d2", cache=True, error_model="numpy")
+def densities_among(points, densities):
+    """Add the density (LEVELS, N) of the other points around each of the points (N, 3).
+
+    It is that of normals, of `LARGEST_WIDTH` in the first row and of half the variance of the last row in each other.
+    """
+    count, levels = densities.shape[1], densities.shape[0]
+    factor = 0.5 / LARGEST_WIDTH**2
+    for i in range(count):
+        for j in range(i):
+            x, y, z = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1], points[i, 2] - points[j, 2]
+            t = factor * (x * x + y * y + z * z)
+            if t >= 0.5 * REACH:
+                continue
+            w = _decay(t)
+            for level in range(levels):
+                densities[level, i] += w
+                densities[level, j] += w
+                w *= w
+                if w < 1e-9:
+                    break
+    for level in range(levels):
+        scale = (2 * np.pi * LARGEST_WIDTH**2 / 2.0**level) ** -1.5 / count
+        for i in range(count):
+            densities[level, i] *= scale
+
+
+@njit(ahead="d2 d3 l ? d d d d2 l1 d1 d l1 d2 d1 d1 d1 d2 d2", cache=True, error_model="numpy")
 def fit_all(
-    observed, poses, iterations, moving, precision, arm, least, points, starts, low, cell, cells,
-    likelihood, variance, outliers, inlier,
+    observed, poses, iterations, moving, precision, arm, least, points, starts, low, cell, cells, densities,
+    likelihood, variance, outliers, matched, lone,
 ):  # fmt: skip
     """Maximize the likelihood of the observed points (N, 3) from every pose (n, 4, 4), in place.
 
@@ -29,8 +57,10 @@ def fit_all(
         precision, arm: of the anchor (:class:`gpca.reenactment.mixture.Anchor`); 0 for none.
         least: the smallest variance of the normals.
         points: (3, M) in the order of their cells, see :class:`gpca.alignment.batched_icp.Target`.
+        densities: of the observed points among themselves (:func:`densities_among`); without rows, the model lacks none.
         variance: (n,) of the normals at first, is replaced.
-        likelihood, outliers, inlier: (n,), the last (n, N), are filled.
+        likelihood, outliers: (n,), are filled, as are matched and lone: (n, N), the probabilities of each point to lie
+            on the model's surface, and on surface that the model lacks.
     """
     moments, room, near = np.empty((4, 4)), np.empty((8, 4)), np.empty_like(points)
     before = np.empty((4, 4))
@@ -40,9 +70,10 @@ def fit_all(
         outliers[n] = FIRST_OUTLIERS
         converged = False
         for iteration in range(iterations + 1):
-            likelihood[n], weight, square = _expect(
-                observed, pose, points, starts, low, cell, cells, variance[n], outliers[n], inlier[n], moments, near
-            )
+            likelihood[n], weight, square, alone = _expect(
+                observed, pose, points, starts, low, cell, cells, densities, variance[n], outliers[n],
+                matched[n], lone[n], moments, near,
+            )  # fmt: skip
             if iteration == iterations or converged:
                 break
             if weight > 1e-9:
@@ -57,19 +88,27 @@ def fit_all(
                     moments /= moments[3, 3]
                     move(pose, moments, room)
                     converged = converged and _change(before, pose) <= STILL
-            outliers[n] = min(max(1 - weight / count, FEWEST_OUTLIERS), MOST_OUTLIERS)
+            outliers[n] = min(max(1 - weight / count - alone, FEWEST_OUTLIERS), MOST_OUTLIERS)
 
 
 @njit(**INNER_LOOP)
-def _expect(observed, pose, points, starts, low, cell, cells, variance, outliers, inlier, moments, near):
-    """Fill the probability (N,) of each point to be no outlier, and Σ w [q, 1] [p, 1]ᵀ over points p and partners q.
+def _expect(
+    observed, pose, points, starts, low, cell, cells, densities, variance, outliers, matched, lone,
+    moments, near,
+):  # fmt: skip
+    """Fill how probably each point (N,) lies on the model's surface, and on surface that the model lacks.
 
-    Returns the mean log-likelihood, Σ w, and Σ w times the mean squared distance of each point from its partners.
+    Fills Σ w [q, 1] [p, 1]ᵀ over points p and partners q as well. Returns the mean log-likelihood, Σ w, Σ w times the
+    mean squared distance of each point from its partners, and the share of surface that the model lacks.
     """
     limit, factor = REACH * variance, 0.5 / variance
-    scale = (1.0 - outliers) / points.shape[1] * (2 * np.pi * variance) ** -1.5
-    total, weight, square = 0.0, 0.0, 0.0
+    unmatched = UNMATCHED if len(densities) else 0.0
+    scale = (1.0 - outliers - unmatched) / points.shape[1] * (2 * np.pi * variance) ** -1.5
+    total, weight, square, alone = 0.0, 0.0, 0.0, 0.0
     moments[:] = 0.0
+    above = np.log2(LARGEST_WIDTH**2 / variance)  # levels of the densities
+    level = max(min(int(above), len(densities) - 2), 0)
+    part = above - level
     for i in range(len(observed)):
         x, y, z = observed[i, 0], observed[i, 1], observed[i, 2]
         px = pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z + pose[0, 3]
@@ -77,10 +116,14 @@ def _expect(observed, pose, points, starts, low, cell, cells, variance, outliers
         pz = pose[2, 0] * x + pose[2, 1] * y + pose[2, 2] * z + pose[2, 3]
         found = _list_near(px, py, pz, limit, points, starts, low, cell, cells, near)
         s, sx, sy, sz, sd = _sums(px, py, pz, limit, factor, near, found)
-        density = scale * s + outliers  # the cube of the outliers has edge 1
+        lacked = 0.0
+        if unmatched > 0.0:
+            lacked = unmatched * max((1 - part) * densities[level, i] + part * densities[level + 1, i], 0.0)
+        density = scale * s + lacked + outliers  # the cube of the outliers has edge 1
         total += np.log(density)
         w = scale * s / density
-        inlier[i] = w
+        matched[i], lone[i] = w, lacked / density
+        alone += lacked / density
         if s > 0.0:
             weight += w
             square += w * (sd / s)
@@ -101,7 +144,7 @@ def _expect(observed, pose, points, starts, low, cell, cells, variance, outliers
             moments[3, 1] += w * py
             moments[3, 2] += w * pz
             moments[3, 3] += w
-    return total / len(observed), weight, square
+    return total / len(observed), weight, square, alone / len(observed)
 
 
 @njit(**INNER_LOOP)

@@ -19,8 +19,11 @@ from gpca.reenactment.surface_kernels import nearest_rows, shares_within, surfac
 
 JUDGED = 256  # points over which an error is the mean
 COMPARED = 64  # points that tell whether two poses are the same
+PART, UNEVEN = 0.95, 3.0  # share of them beyond which a part lies, and how much farther it may lie than the mean
 TRIMMED = 0.94  # share of the residuals that count, the smallest: outliers are at most a twentieth
 LEAST_SPACING = 1e-4  # diameters; a user's cloud may hold every point twice
+# A turn is a symmetry if the mean distance from the surface is at most SYMMETRIC + SPARSE · spacing + NOISY · noise.
+SYMMETRIC, SPARSE, NOISY = 0.012, 0.25, 0.2
 CORNER = 1.5  # of the spacing: so far from a point, along its plane, its surface reaches
 
 
@@ -32,10 +35,12 @@ class ModelSurface:
         centers, normals, tangents: (M, 3), (M, 3) and (M, 2, 3) of the planes through each point and its neighbors.
         roughness: variance of the distance between a plane and points of the surface that had no part in it, beyond
             that of the points that had.
+        center, noise: (3,) of the whole shape, and standard deviation of some points; 0 but for a completed model.
     """
 
     def __init__(self, points: np.ndarray) -> None:
         self.points = np.ascontiguousarray(points, np.float64)
+        self.center, self.noise = np.zeros(3), 0.0
         self.tree = cKDTree(self.points)
         neighbors = min(8 if len(points) < 256 else 10 if len(points) < 512 else 12, len(points) - 1)
         distances, rows = self.tree.query(self.points, neighbors + 1)
@@ -51,8 +56,13 @@ class ModelSurface:
 
     @cached_property
     def symmetries(self) -> dict[str, list]:
-        """The turns that leave the shape as it is (:func:`gpca.objects.bop.find_symmetries`)."""
-        return find_symmetries(self.points, 1.0)
+        """The turns that leave the shape as it is (:func:`gpca.objects.bop.find_symmetries`).
+
+        Distances are from the surface: those to the points would hide a handle that is no larger than their spacing.
+        """
+        limit = SYMMETRIC + SPARSE * self.spacing + NOISY * self.noise
+        centered = self.points[:JUDGED] - self.center
+        return find_symmetries(centered, 1.0, lambda points: self.distances(points + self.center), limit)
 
     @property
     def symmetric(self) -> bool:
@@ -89,10 +99,25 @@ class ModelSurface:
             return self.distances(moved.reshape(-1, 3)).reshape(moved.shape[:2]).mean(axis=1)
         return np.sqrt(np.square(moved - points).sum(axis=2)).mean(axis=1)
 
+    def completed(self, points: np.ndarray, noise: float) -> ModelSurface:
+        """Return the surface with noisy points (N, 3) of the part that the model lacks.
+
+        Errors are still means over the model's own points.
+        """
+        whole = ModelSurface(np.concatenate([self.points, points]))
+        whole.center, whole.noise = (whole.points.min(axis=0) + whole.points.max(axis=0)) / 2, noise
+        return whole
+
     def apart(self, T_between_n: np.ndarray) -> np.ndarray:
-        """Return how far (n,) the surface lies from itself after each motion (n, 4, 4)."""
+        """Return how far (n,) the surface lies from itself after each motion (n, 4, 4).
+
+        It is the mean distance, or a share of that of the farthest part: a lid or a handle elsewhere is another pose,
+        although most of the surface stays where it was.
+        """
         points = self.points[:COMPARED]
-        return self.distances(_moved(T_between_n, points).reshape(-1, 3)).reshape(len(T_between_n), -1).mean(axis=1)
+        distance_n_P = self.distances(_moved(T_between_n, points).reshape(-1, 3)).reshape(len(T_between_n), -1)
+        distance_n_P.partition(farthest := int(PART * len(points)), axis=1)
+        return np.maximum(distance_n_P.mean(axis=1), distance_n_P[:, farthest] / UNEVEN)
 
     @cached_property
     def _target(self):

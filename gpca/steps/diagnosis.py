@@ -123,7 +123,7 @@ def with_what_it_reads(registrations: Registrations, reads: str, path: Path | No
     elif reads == REENACTED:
         enacted = Reenactments.load(path, registrations)
         read = {"verdict": enacted.verdict, "reenactment": reenactment_features(enacted)}
-        read |= {"hypotheses": enacted.T_model_observed, "weight": enacted.weight}
+        read |= {"result_error": enacted.result_error, "weight": enacted.weight}
     else:
         read = dict(Descriptors.load(path, registrations).groups)
     return replace(registrations, attached={**registrations.attached, **read})

@@ -12,7 +12,7 @@ from gpca.causes.dataset import labels_of
 from gpca.causes.drawing import draw_causes
 from gpca.causes.settings import CauseSettings, CauseSeverities, Small
 from gpca.config.layers import with_defaults
-from gpca.pairs.perturbation import CONCEPTS
+from gpca.pairs.perturbation import CONCEPTS, NOISE, OVERLAP, POSE
 from gpca.rigid import exp, inverse, rotation_angle_rad
 from gpca.uncertainty.spread import divergence
 
@@ -97,6 +97,23 @@ def test_noise_is_as_strong_as_it_says_outliers_are_few_and_one_side_is_cut_off(
         offset = np.abs(candidate.noisy - candidate.clean)
         assert np.median(offset) == pytest.approx(0.6745 * candidate.severity["noise"], rel=0.5)
         assert np.abs(candidate.noisy).max() < 0.5 + 6 * candidate.severity["noise"]
+
+
+def test_a_partial_model_is_whole_without_overlap_and_changes_no_draw_of_others(subjects):
+    for k in range(8):
+        random = np.random.default_rng(k)
+        usual = draw_candidate(subjects[0].surface, np.ones(3, bool), SETTINGS, np.random.default_rng(k))
+        partial = draw_candidate(subjects[0].surface, np.ones(3, bool), replace(SETTINGS, partial=1.0), random)
+        assert np.array_equal(partial.whole_model, usual.model) and np.array_equal(partial.noisy, usual.noisy)
+        assert np.array_equal(partial.reference((NOISE, POSE)), usual.model)
+        lacking = partial.reference((OVERLAP,))
+        to_model = np.linalg.norm(usual.model[:, None] - lacking, axis=2).min(axis=1)
+        assert 0.02 < (to_model > 0.12).mean() < 0.7
+        assert partial.changing_reference((POSE, OVERLAP)) == (OVERLAP,)
+    unhidden = draw_candidate(
+        subjects[0].surface, np.zeros(3, bool), replace(SETTINGS, partial=1.0), np.random.default_rng(0)
+    )
+    assert unhidden.whole_model is None
 
 
 def test_severities_of_what_is_not_applied_are_small(subjects):

@@ -25,9 +25,9 @@ def moved(turn_deg=(0, 0, 0), shift=(0, 0, 0)):
 
 def enacted(T):
     """An enactment of this hypothesis, with noise of 2 %, a quarter outliers and half of the surface missing."""
-    hypothesis = Hypothesis(T, np.ones(4), 0.0, 0.01, 1.0, 0.0)
+    hypothesis = Hypothesis(T, np.ones(4), 0.0, 0.01, 1.0, 0.0, np.zeros(4))
     candidate = SimpleNamespace(severity={"noise": 0.02, "outliers": 0.25, "crop": 0.5})
-    return Enactment(hypothesis, candidate, ERRORS, np.zeros(8), 0.0)
+    return Enactment(hypothesis, candidate, ERRORS, np.zeros(8), np.zeros, 0.0)
 
 
 def said(points, *poses):

@@ -16,7 +16,7 @@ from tests.reenactment.conftest import TRUTH, candidate_of, pair_of
 
 
 def hypothesis(inlier_N):
-    return Hypothesis(np.eye(4), inlier_N, 0.0, 0.02, 1.0, 0.0)
+    return Hypothesis(np.eye(4), inlier_N, 0.0, 0.02, 1.0, 0.0, np.zeros(len(inlier_N)))
 
 
 @pytest.fixture(scope="module")

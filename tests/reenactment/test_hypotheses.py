@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from gpca.pairs.perturbation import within_half_space
 from gpca.reenactment.hypotheses import (
     distinct_rows,
     find_hypotheses,
@@ -51,13 +52,27 @@ def found(pair, surface, settings=SETTINGS):
 
 @pytest.mark.parametrize("causes", [(), ("noise",), ("pose",), ("overlap",), ("pose", "overlap")])
 def test_the_true_pose_is_the_most_probable(drill, causes):
-    candidate = candidate_of(drill, *causes, seed=101)
+    candidate = candidate_of(drill, *causes, seed=103)
     pair, T_true = pair_of(candidate)
     surface = ModelSurface(candidate.model)
     hypotheses = found(pair, surface)
     assert surface.errors((hypotheses[0].T @ inverse(T_true))[None])[0] < 0.03
     posterior = [hypothesis.log_posterior for hypothesis in hypotheses]
     assert posterior == sorted(posterior, reverse=True) and posterior[0] - posterior[-1] < 4.5
+
+
+def test_where_the_model_lacks_surface_the_points_beyond_are_neither_outliers_nor_a_reason_for_another_pose(drill):
+    candidate = candidate_of(drill, "pose", seed=101)
+    axis = int(np.ptp(drill, axis=0).argmax())
+    candidate = replace(candidate, model=candidate.model[within_half_space(candidate.model[:, axis], 0.3, 1)])
+    pair, T_true = pair_of(candidate)
+    surface = ModelSurface(candidate.model)
+    best = found(pair, surface)[0]
+    assert surface.errors((best.T @ inverse(T_true))[None])[0] < 0.03
+    before = transform(T_true, transform(pair.T_init, pair.observed))
+    beyond = before[:, axis] > candidate.model[:, axis].max() + 0.1
+    assert beyond.sum() > 20 and (best.lone_N[beyond] > 0.5).mean() > 0.9 and (best.inlier_N[beyond] > 0.5).all()
+    assert (best.lone_N[~beyond] > 0.5).mean() < 0.5
 
 
 def test_a_can_has_one_hypothesis_however_it_is_turned_about_its_axis(can):

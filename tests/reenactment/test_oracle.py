@@ -43,7 +43,8 @@ def rebuilt_at_the_truth(candidate):
     random, causes = np.random.default_rng(0), tuple(np.flatnonzero(candidate.applied).tolist())
     surface = ModelSurface(candidate.model)
     observed = candidate.observed(causes)
-    hypothesis = Hypothesis(inverse(candidate.start(causes)), np.ones(len(observed)), 0.0, 0.02, 1.0, 0.0)
+    none, every = np.zeros(len(observed)), np.ones(len(observed))
+    hypothesis = Hypothesis(inverse(candidate.start(causes)), every, 0.0, 0.02, 1.0, 0.0, none)
     before = observed @ candidate.start(causes)[:3, :3].T + candidate.start(causes)[:3, 3]
     observation = observe(before, hypothesis, surface, NoiseScale(surface, random), random)
     return rebuild(hypothesis.T, observation, surface, random)

@@ -66,7 +66,7 @@ def test_nothing_that_only_the_truth_knows_is_read(good_and_bad, enacted):
 
 
 def at(T, points):
-    return Hypothesis(T, np.ones(len(points)), 0.0, 0.02, 1.0, 0.0)
+    return Hypothesis(T, np.ones(len(points)), 0.0, 0.02, 1.0, 0.0, np.zeros(len(points)))
 
 
 @pytest.fixture
