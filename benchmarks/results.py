@@ -1,12 +1,12 @@
 """Judge results of unseen families at several tolerances, beside gates and the untrained re-enactment.
 
-    python benchmarks/results.py CAUSES:REENACTMENTS [CAUSES:REENACTMENTS …]
+    python benchmarks/results.py CAUSES:REENACTMENTS [CAUSES:REENACTMENTS …] [partial=CAUSES:REENACTMENTS …]
 
 Each argument names two files of a run, such as results/full/model_causes/ycb/seed0.npz and the file of the same name
 below model_reenactments/. docs/guarantee.md has the protocol. `clear` leaves out errors between two thirds of the
-tolerance and the tolerance; `far` are starts that are 30 to 60° off. The last line is a JSON object of the trained
+tolerance and the tolerance; `far` are starts that are 30 to 60° off, and what follows ``partial=`` is shown apart. The last line is a JSON object of the trained
 judge at 3 %: samples, good, families, auroc, auroc_clear, false_alarms, missed, and each
-again for far starts, as far_….
+again for far starts, as far_…, and for files after ``partial=``, as partial_….
 """
 
 from __future__ import annotations
@@ -35,28 +35,34 @@ from gpca.seeds import generator  # noqa: E402
 FOLDS = 5  # of the families
 CLEAR = 2 / 3  # of the tolerance
 FAR_DEG = 30.0, 60.0
+PARTIAL = "partial="
+TITLES = {"": "", "far_": ", far starts", "partial_": ", partial targets"}
 JUDGE, UNTRAINED, GATES = "result", "untrained", ("fitness", "inlier_rmse")
 
 
 def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("pairs", nargs="+", help="CAUSES:REENACTMENTS")
-    sets, angles = [], []
+    parser.add_argument("pairs", nargs="+", help="[partial=]CAUSES:REENACTMENTS")
+    sets, angles, partial = [], [], []
     for pair in parser.parse_args(arguments).pairs:
-        causes_path, reenactments_path = map(Path, pair.split(":"))
+        causes_path, reenactments_path = map(Path, pair.removeprefix(PARTIAL).split(":"))
         causes = Causes.load(causes_path)
         sets.append(TrainingSet.of(causes, Reenactments.load(reenactments_path, causes.registrations)))
+        partial += [pair.startswith(PARTIAL)] * len(causes)
         angles += [start_angle_deg(causes, row) for row in range(len(causes))]
     samples, angle_N = TrainingSet.joined(sets), np.array(angles)
-    far_N = (angle_N >= FAR_DEG[0]) & (angle_N <= FAR_DEG[1])
+    partial_N = np.array(partial)
+    far_N = (angle_N >= FAR_DEG[0]) & (angle_N <= FAR_DEG[1]) & ~partial_N
     print(
         "Promised: at most 5 % of good results called failed, and of failures called good. 95 % intervals in brackets."
     )
     result: dict[str, float] = {}
     for tolerance in TOLERANCES:
         judged = judge_unseen(samples, tolerance)
-        for prefix, rows in (("", np.arange(len(far_N))), ("far_", np.flatnonzero(far_N))):
-            found = measured(samples, judged, tolerance, rows, prefix)
+        for prefix, mask_N in (("", ~partial_N), ("far_", far_N), ("partial_", partial_N)):
+            if not mask_N.any():
+                continue
+            found = measured(samples, judged, tolerance, np.flatnonzero(mask_N), prefix)
             if tolerance == DEFAULT_TOLERANCE:
                 result |= found
     print(json.dumps(result))
@@ -113,7 +119,7 @@ def measured(
     weights_B_N = np.concatenate([np.ones((1, len(rows))), pigeonhole_weights(generator("results"), family_N)])
     counts = {"samples": len(rows), "good": int((~off_N).sum()), "families": len(set(family_N.tolist()))}
     title = ", ".join(f"{number} {name}" for name, number in counts.items())
-    print(f"\ntolerance {100 * tolerance:g} %{', far starts' * bool(prefix)}: {title}")
+    print(f"\ntolerance {100 * tolerance:g} %{TITLES[prefix]}: {title}")
     rows_of = {}
     for name, (score_N, call_N) in judged.items():
         score_n, call_n = score_N[rows], call_N[rows]

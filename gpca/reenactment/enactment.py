@@ -168,7 +168,8 @@ def reenact(
     T_found_n = pair.T_runs @ inverse(pair.T_init)
     random = generator(*pair.axes, "hypotheses")
     hypotheses = find_hypotheses(before, surface, T_found_n, settings, random)
-    scale, enactments, whole = NoiseScale(surface, random), [], surface
+    scale, whole = NoiseScale(surface, random), surface
+    enactments: list[Enactment] = []
     for hypothesis in hypotheses:
         observation = observe(before, hypothesis, surface, scale, random)
         if not enactments and observation.is_lone.mean() >= LEAST_LACKING:

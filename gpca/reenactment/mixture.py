@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gpca.reenactment.mixture_kernels import FIRST_WIDTH, fit_all, densities_among
+from gpca.reenactment.mixture_kernels import FIRST_WIDTH, densities_among, fit_all
 
 LEVELS = 9  # of widths at which the densities of the observed points are known, each √½ of the last
 CELL = 0.15  # diameters; edge of the cubes that the model's points are sorted into

@@ -57,7 +57,7 @@ def fit_all(
         precision, arm: of the anchor (:class:`gpca.reenactment.mixture.Anchor`); 0 for none.
         least: the smallest variance of the normals.
         points: (3, M) in the order of their cells, see :class:`gpca.alignment.batched_icp.Target`.
-        densities: of the observed points among themselves (:func:`densities_among`); without rows, the model lacks none.
+        densities: of the observed points (:func:`densities_among`); without rows, the model lacks no surface.
         variance: (n,) of the normals at first, is replaced.
         likelihood, outliers: (n,), are filled, as are matched and lone: (n, N), the probabilities of each point to lie
             on the model's surface, and on surface that the model lacks.
