@@ -1,12 +1,12 @@
 """Judge results of unseen families at several tolerances, beside gates and the untrained re-enactment.
 
-    python benchmarks/results.py CAUSES:REENACTMENTS [CAUSES:REENACTMENTS …] [partial=CAUSES:REENACTMENTS …]
+    python benchmarks/results.py CAUSES:REENACTMENTS … [partial=CAUSES:REENACTMENTS …]
 
 Each argument names two files of a run, such as results/full/model_causes/ycb/seed0.npz and the file of the same name
 below model_reenactments/. docs/guarantee.md has the protocol. `clear` leaves out errors between two thirds of the
-tolerance and the tolerance; `far` are starts that are 30 to 60° off, and what follows ``partial=`` is shown apart. The last line is a JSON object of the trained
-judge at 3 %: samples, good, families, auroc, auroc_clear, false_alarms, missed, and each
-again for far starts, as far_…, and for files after ``partial=``, as partial_….
+tolerance and the tolerance; `far` are starts that are 30 to 60° off, and what follows ``partial=`` is shown apart. The
+last line is a JSON object of the trained judge at 3 %: samples, good, families, auroc, auroc_clear, false_alarms,
+missed, and each again for far starts, as far_…, and for partial targets, as partial_….
 """
 
 from __future__ import annotations
