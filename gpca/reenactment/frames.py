@@ -130,7 +130,7 @@ def find_frame_hypotheses(
         log_posterior = min(len(observed), search.INDEPENDENT) * (likelihood - density) + search.log_prior(T, settings)
         log_posterior -= MISSING * (1 - share)
         width = float(fits.width_n[0])
-        return Hypothesis(T, fits.matched_n_N[0], likelihood, width, share, float(log_posterior), fits.lone_n_N[0])
+        return Hypothesis(T, fits.inlier_n_N[0], likelihood, width, share, float(log_posterior), fits.lone_n_N[0])
 
     def best(T_n: np.ndarray, observed: np.ndarray, pixels: int, rounds: int, apart: float) -> list[Hypothesis]:
         begun = [*((T, None) for T in T_n), (np.eye(4), search.anchor_of(len(observed), settings))]

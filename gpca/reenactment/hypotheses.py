@@ -186,7 +186,7 @@ def _hypothesis(
     random: np.random.Generator,
     evidence: Evidence | None,
 ) -> Hypothesis:
-    T, matched_N, width = fits.T_n[i], fits.matched_n_N[i], float(fits.width_n[i])
+    T, matched_N, width = fits.T_n[i], fits.inlier_n_N[i], float(fits.width_n[i])
     seen = transform(T, observed)
     if (matched_N > 0.5).sum() >= FEWEST_INLIERS:
         seen = seen[matched_N > 0.5]

@@ -39,7 +39,7 @@ class Fits:
     log_likelihood_n: np.ndarray  # mean over the points, nats
     width_n: np.ndarray  # of the normals, standard deviation per axis
     outliers_n: np.ndarray  # share
-    matched_n_N: np.ndarray  # probability of each point to lie on the model's surface
+    inlier_n_N: np.ndarray  # probability of each point to lie on the model's surface,
     lone_n_N: np.ndarray  # and on surface that the model lacks
 
 
@@ -76,15 +76,15 @@ class Mixture:
         likelihood_n, outliers_n = np.empty((2, n))
         width_n = np.full(n, FIRST_WIDTH) if width_n is None else width_n
         variance_n = np.maximum(np.square(width_n, dtype=np.float64), self._least)
-        matched_n_N, lone_n_N = np.empty((2, n, len(observed)))
+        inlier_n_N, lone_n_N = np.empty((2, n, len(observed)))
         precision, arm = (anchor.strength / anchor.translation**2, anchor.arm) if anchor else (0.0, 0.0)
         fit_all(
             *(np.ascontiguousarray(observed, np.float64), poses_n, iterations, moving, precision, arm, self._least),
             *(self._points_3_M, self._starts, self._low, CELL, self._cells),
             np.empty((0, len(observed))) if densities is None else densities,
-            *(likelihood_n, variance_n, outliers_n, matched_n_N, lone_n_N),
+            *(likelihood_n, variance_n, outliers_n, inlier_n_N, lone_n_N),
         )
-        return Fits(poses_n, likelihood_n, np.sqrt(variance_n), outliers_n, matched_n_N, lone_n_N)
+        return Fits(poses_n, likelihood_n, np.sqrt(variance_n), outliers_n, inlier_n_N, lone_n_N)
 
 
 def densities_of(observed: np.ndarray, model: np.ndarray) -> np.ndarray:

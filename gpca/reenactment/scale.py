@@ -123,7 +123,7 @@ def _log_posterior(
 ) -> float:
     """Return nats, as :func:`gpca.reenactment.hypotheses.find_hypotheses` does, of scaled points where a pose is."""
     fits = mixture.fit(points, np.eye(4)[None], ITERATIONS)
-    T, inlier_N, width = fits.T_n[0], fits.matched_n_N[0] > 0.5, float(fits.width_n[0])
+    T, inlier_N, width = fits.T_n[0], fits.inlier_n_N[0] > 0.5, float(fits.width_n[0])
     seen = rotate(T, points[inlier_N] if inlier_N.sum() > 7 else points) + T[:3, 3]
     covered = share_within(surface.points, seen, 0.7 * width, random)
     density = (1 - fits.outliers_n[0]) * np.log(max(covered, LEAST_COVERED))

@@ -29,7 +29,7 @@ def test_the_likelihood_counts_all_partners_within_reach_and_no_others(drill, mo
     density = (1 - FIRST_OUTLIERS) * weights.mean(axis=1) * (2 * np.pi * variance) ** -1.5 + FIRST_OUTLIERS
     fits = Mixture(model.points, 0.05).fit(points, np.eye(4)[None], iterations=0)
     assert fits.log_likelihood_n[0] == pytest.approx(np.log(density).mean(), abs=1e-8)
-    assert fits.matched_n_N[0] == pytest.approx(1 - FIRST_OUTLIERS / density, abs=1e-8)
+    assert fits.inlier_n_N[0] == pytest.approx(1 - FIRST_OUTLIERS / density, abs=1e-8)
 
 
 def test_a_fit_that_has_converged_stops(drill, model):
@@ -45,7 +45,7 @@ def test_a_known_pose_is_recovered_from_noise_and_outliers(drill, model):
     points[:20] = RANDOM.uniform(-0.5, 0.5, size=(20, 3))
     fits = Mixture(model.points, model.spacing / 2).fit(transform(inverse(T_true), points), np.eye(4)[None], 60)
     assert model.errors(fits.T_n @ inverse(T_true))[0] < 0.015
-    assert fits.matched_n_N[0, 20:].mean() > 0.9 > 0.6 > fits.matched_n_N[0, :20].mean()
+    assert fits.inlier_n_N[0, 20:].mean() > 0.9 > 0.6 > fits.inlier_n_N[0, :20].mean()
     assert 0.02 < fits.width_n[0] < 0.045  # of the noise, and of the gaps between the model's points
 
 
@@ -58,7 +58,7 @@ def test_iterations_raise_the_likelihood(drill, model):
 def test_points_without_any_partner_are_outliers_and_move_nothing(model):
     fits = Mixture(model.points, 0.01).fit(np.full((5, 3), 9.0), np.eye(4)[None], 4)
     assert np.array_equal(fits.T_n[0], np.eye(4))
-    assert (fits.matched_n_N == 0).all() and fits.outliers_n[0] == 0.2
+    assert (fits.inlier_n_N == 0).all() and fits.outliers_n[0] == 0.2
 
 
 def test_an_anchor_holds_the_pose_as_firmly_as_it_is_strong(drill, model):
