@@ -99,7 +99,13 @@ def compared(diagnoser, diagnoses: Sequence, right: Sequence[bool]) -> dict[str,
     print(f"{len(known)} registrations of a known state, {right_N.sum()} right; mean (5 to 95 % of the draws)")
     print(f"{'labeled':>7}", *(f"{name:>24}" for name in MEASURES))
     result = {"samples": len(known), "right": int(right_N.sum())}
-    result |= printed("none", [risks(own, scores_N_5, right_N)] if own else [])
+    if own:
+        result |= printed("none", [risks(own, scores_N_5, right_N)])
+        call_N = own.alarm(1 - scores_N_5[:, 0])
+        for call in np.unique(call_N):
+            print(
+                f"{call:>15}: {(call_N == call).mean():.1%}, of which {(~right_N)[call_N == call].mean():.1%} are wrong"
+            )
     for count in COUNTS:
         draws = []
         for number in range(REPEATS):
@@ -109,7 +115,7 @@ def compared(diagnoser, diagnoses: Sequence, right: Sequence[bool]) -> dict[str,
             if len(set(labels)) == 2:
                 [level] = LabeledRegistrations.of([diagnoses[row] for row in labeled], labels).levels()
                 draws.append(risks(level.guarantee, scores_N_5[others], right_N[others]))
-        result |= printed(str(count), draws)
+        result |= printed(str(count), draws) if draws else {}
     return result
 
 
@@ -124,8 +130,6 @@ def risks(guarantee, scores_M_5, right_M) -> list[float]:
 def printed(name: str, draws: Sequence[Sequence[float]]) -> dict[str, float]:
     import numpy as np
 
-    if not draws:
-        return {}
     mean_4, low_4, high_4 = np.mean(draws, axis=0), *np.quantile(draws, [0.05, 0.95], axis=0)
     cells = [f"{mean:.1%} ({low:.1%} to {high:.1%})" for mean, low, high in zip(mean_4, low_4, high_4, strict=True)]
     print(f"{name:>7}", *(f"{cell:>24}" for cell in cells))

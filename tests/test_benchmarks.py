@@ -2,6 +2,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -377,3 +378,21 @@ def test_convergence_trains_and_judges_an_encoder(tmp_path, registrations):
     assert (row["backbone"], row["epochs"], row["seed"]) == ("pointnet", "1", "100")
     assert 0 <= float(row["gpc_accuracy"]) <= 1
     assert float(row["loss"]) > 0
+
+
+def test_limits_of_labels_are_tested_on_the_other_registrations(monkeypatch, capsys):
+    from benchmarks import calibration
+    from gpca.model.explainer import Explainer
+    from gpca.model.location import SHIPPED
+
+    explainer = Explainer.load(SHIPPED)
+    (one, _), (two, right) = calibration.registered(explainer, 2, "3%", shifted=True)
+    assert one.result != two.result and isinstance(right, bool)
+    for name, value in (("COUNTS", (40,)), ("REPEATS", 5)):
+        monkeypatch.setattr(calibration, name, value)
+    wrong_N = np.arange(100) % 2 == 0
+    diagnoses = [replace(one, result=0.1 + 0.8 * wrong + 0.001 * n, void=False) for n, wrong in enumerate(wrong_N)]
+    found = calibration.compared(explainer.model.diagnoser, diagnoses, (~wrong_N).tolist())
+    assert (found["samples"], found["right"]) == (100, 50)
+    assert found["failures_called_good_40"] < 0.2 and found["sets_hold_the_truth_40"] > 0.7
+    assert "not sure" in capsys.readouterr().out
