@@ -216,13 +216,13 @@ def difference(surface: ModelSurface, T_one: np.ndarray, T_other: np.ndarray) ->
     return Part.of(surface, inside_M), float(distance_M[inside_M].mean())
 
 
-def unseen(points: np.ndarray, surface: ModelSurface, T: np.ndarray) -> tuple[float, Part | None, float]:
-    """Return the share of outliers among observed points (N, 3) at a pose, what they leave out, and their noise.
+def unseen(points: np.ndarray, surface: ModelSurface, T: np.ndarray) -> tuple[float, Part | None]:
+    """Return the share of outliers among observed points (N, 3) at a pose, and the part of the surface they leave out.
 
-    They leave out a part of the surface, or None.
+    It is None where they leave out next to nothing.
     """
     fits = Mixture(surface.points, surface.spacing / 2).fit(points, T[None], LAST_ITERATIONS, moving=False)
     inlier_N, blur = fits.inlier_n_N[0] > 0.5, OF_WIDTH * float(fits.width_n[0])
     seen = transform(T, points[inlier_N] if inlier_N.sum() >= FEWEST_INLIERS else points)
     missing_M = ~covered_points(surface.points, seen, blur, generator("repair", "blur"))
-    return float(1 - inlier_N.mean()), Part.of(surface, missing_M) if missing_M.any() else None, blur
+    return float(1 - inlier_N.mean()), Part.of(surface, missing_M) if missing_M.any() else None

@@ -160,8 +160,8 @@ class Repair(ExplainedRegistration):
         poses = [pose.outside(frame, T_init) for pose in other_poses(proposals, verdict, errors_n, surface)]
         if verdict.name != GOOD:
             T_best = proposals.T_n[verdict.row or 1]
-            outliers, missing, noise = unseen(clouds.source, surface, T_best)
-            free = undetermined_at(transform(T_best, before), surface, noise)
+            outliers, missing = unseen(clouds.source, surface, T_best)
+            free = undetermined_at(transform(T_best, before), surface)
             spread = PoseSpread(free.covariance, frame.diameter, SURFACE, None)
             parts: dict[str, Any] = {"free": free.outside(frame), "spread": spread}
             unrepaired = replace(unrepaired, outliers=outliers, missing=missing, **parts)
