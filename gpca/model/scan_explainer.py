@@ -42,6 +42,7 @@ LIMIT_M, LIMIT_VOXELS, LIMIT_SHARE = 0.2, 2.0, 0.05
 OF_ELSEWHERE, OF_LOG_APART, LOG_ODDS = 5.4, 4.2, -2.0
 GOOD, BAD = 0.2, 0.5  # probability of a failure below which the state is nominal, and from which it is failed
 LEAST_OVERLAP = 0.2  # share of the source below which a wrong pose fits as well as the right one
+VOLUME = "the points of a scan fill a volume, as noise does, instead of lying on surfaces: any pose fits"
 OWN_ERROR = 0.3  # voxels, of a pose that fits
 LEAST = 1e-6  # lower bound of arguments of logarithms
 ADDS = 1 / 3  # of the limit, that a cause adds at least to the error: as in the diagnosis of objects
@@ -88,6 +89,8 @@ def explain_scans(
     evidence, overlap = evidence_at(scans, ranked, T_found, tolerance), scans.overlap(T_found)
     failure = failure_of(evidence)
     state = state_of(failure, overlap[0])
+    if scans.fills_volume and state == NOMINAL:
+        state = NOT_SURE
     causes = () if state == NOMINAL else causes_of(reenacted, limit)
     action, reason = decision(state, reenacted, overlap[0], causes)
     if (scale := reenacted.scale) and scale.off and scale.error > limit:
@@ -123,7 +126,9 @@ def explain_scans(
         unit=unit,
         seconds=perf_counter() - started,
         notes=tuple(notes),
-        warnings=(warning,) if overlap[0] < LEAST_OVERLAP else (),
+        warnings=tuple(
+            words for words, given in ((warning, overlap[0] < LEAST_OVERLAP), (VOLUME, scans.fills_volume)) if given
+        ),
         scene=Scene(
             *(scans.source, scans.target, T_found, frame, SHOWN_REACH * scans.voxel, tolerance),
             enactments=enactments,

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from gpca.alignment.batched_icp import BatchedICP, BatchedPlaneICP
-from gpca.alignment.features import estimate_normals
+from gpca.alignment.features import NEIGHBORS, estimate_normals
 from gpca.alignment.icp import ICPSettings, clipped_cost
 from gpca.alignment.methods.interface import Outcome, Pair
 from gpca.alignment.methods.registry import make_method
@@ -43,6 +43,7 @@ GROWTH = 1.25  # least factor between tried edges
 MEASURED = 5000  # number of points whose spacing is measured
 COARSE_TO_FINE = (10.0, 5.0, 2.5)  # correspondence distances of successive ICPs, in voxels
 FLAT = 0.01  # of the middle extent: a cloud whose smallest is no larger is flat, and has no normals that move it
+THICK = 0.15  # between development scenes, up to .08, and noise, from .2
 ITERATIONS = 30  # of each ICP
 PARTNER = 2.0  # largest distance between points of the same surface, in voxels
 ALIKE = 0.8  # cosine of the largest angle between their normals
@@ -289,6 +290,11 @@ class Scans:
         return any(_axes(points)[1] <= FLAT for points in (self.source, self.target))
 
     @cached_property
+    def fills_volume(self) -> bool:
+        """Whether either scan fills a volume, as noise does, instead of lying on surfaces."""
+        return any(_thickness(points) > THICK for points in (self.source, self.target))
+
+    @cached_property
     def few(self) -> np.ndarray:
         """Some of the source's points."""
         return _drawn(self.source, SEARCH_POINTS, "source")
@@ -321,6 +327,15 @@ class Scans:
 
 def _drawn(points: np.ndarray, most: int, role: str) -> np.ndarray:
     return points[np.sort(generator("scans", role).permutation(len(points))[:most])]
+
+
+def _thickness(points: np.ndarray) -> float:
+    """Return the median share of variance off the plane of `NEIGHBORS` points: 0 on a plane, a third in a volume."""
+    drawn = _drawn(points, RUN_POINTS, "thickness")
+    near_N_k_3 = points[cKDTree(points).query(drawn, k=NEIGHBORS)[1]]
+    near_N_k_3 = near_N_k_3 - near_N_k_3.mean(axis=1, keepdims=True)
+    variance_N_3 = np.linalg.eigvalsh(np.einsum("nki,nkj->nij", near_N_k_3, near_N_k_3))
+    return float(np.median(variance_N_3[:, 0] / variance_N_3.sum(axis=1)))
 
 
 def _axes(points: np.ndarray) -> tuple[np.ndarray, float]:

@@ -15,11 +15,12 @@ from gpca.alignment.features import estimate_normals
 from gpca.alignment.icp import clipped_cost
 from gpca.alignment.pose_error import displacements
 from gpca.errors import InputError
+from gpca.model import scan_explainer
 from gpca.model.clouds import read_points
 from gpca.model.explanation import GIVEN, NOT_SURE
 from gpca.model.page import length
 from gpca.model.scan_explainer import BAD, GOOD, LEAST_OVERLAP, Evidence, failure_of, state_of
-from gpca.model.scan_registration import COARSE_TO_FINE, VoxelICP, in_voxels, voxel_size
+from gpca.model.scan_registration import COARSE_TO_FINE, Scans, VoxelICP, in_voxels, voxel_size
 from gpca.process.environment import open3d_cloud
 from gpca.rigid import exp, inverse, transform
 
@@ -305,3 +306,13 @@ def test_voxels_are_chosen_by_the_spacing_and_leave_few(scans):
 def test_bad_input_is_one_line(scans, change, message):
     with pytest.raises(InputError, match=message):
         explain_scans(**{"source_points": scans[0], "target_points": scans[1]} | change)
+
+
+def test_noise_on_noise_is_no_success_and_surfaces_are_no_noise(monkeypatch):
+    random = np.random.default_rng(0)
+    noise, plane = random.uniform(size=(600, 3)), random.uniform(size=(600, 3)) * (1, 1, 0.01)
+    assert Scans(noise, plane, 0.1).fills_volume and Scans(plane, noise, 0.1).fills_volume
+    assert not Scans(plane, plane, 0.1).fills_volume
+    monkeypatch.setattr(scan_explainer, "failure_of", lambda _evidence: 0.01)
+    explanation = explain_scans(noise, noise)
+    assert explanation.state == NOT_SURE and "as noise does" in explanation.warnings[0]
