@@ -353,7 +353,12 @@ class Diagnosis:
     def as_dict(self) -> dict[str, object]:
         """Values for JSON."""
         values = asdict(self, dict_factory=plain)
-        return values | {"state": self.state, "named": list(self.named), "caveat": self.reenacted.caveat}
+        return values | {
+            "state": self.state,
+            "named": list(self.named),
+            "doubtful": self.doubtful,
+            "caveat": self.reenacted.caveat,
+        }
 
     def lines(self, unit: str) -> list[str]:
         """Lines of text, with lengths in this unit."""

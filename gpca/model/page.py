@@ -13,7 +13,7 @@ from string import Template
 
 from gpca.causes.policy import NOTHING
 from gpca.causes.truth import BY_SIZE, FAILED
-from gpca.evaluation.conformal import ALARM, GOOD, NOT_SURE
+from gpca.evaluation.conformal import ALARM, GOOD
 from gpca.guarantee.guarantee import STATES, WHETHER_FAILED
 from gpca.model.diagnosis import IN_WORDS, UNKNOWN, Diagnosis, Guaranteed, Reenacted
 from gpca.model.scene import ASSETS, WITHOUT, Scene, taken_out
@@ -53,7 +53,7 @@ def headline(explained: Mapping) -> str:
     if (diagnosis := explained["diagnosis"]) is None:
         return f"<h1>The leading concept is {escape(explained['concept'])}</h1>"
     state = diagnosis["state"]
-    probably = "probably " * ((diagnosis["guarantee"] or {}).get("call") == NOT_SURE)
+    probably = "probably " * diagnosis["doubtful"]
     title = {
         "nominal": f"This registration {probably}succeeded",
         "failed": f"This registration {probably}failed: {' and '.join(diagnosis['named'])}",

@@ -64,7 +64,7 @@ def test_nothing_is_done_about_what_is_fine(model, pair):
     said = with_threshold(model, 2.0).explain(*pair)
     assert (said.diagnosis.state, said.diagnosis.named) == ("nominal", ())
     assert (said.action, said.reason) == (NOTHING, "nothing is wrong")
-    assert "state     nominal: nothing is wrong" in said.text()
+    assert f"state     {'probably ' * said.diagnosis.doubtful}nominal: nothing is wrong" in said.text()
     assert "action    none (nothing is wrong)" in said.text()
 
 
@@ -74,7 +74,7 @@ def test_what_failed_is_treated_by_its_causes(model, pair):
     assert found.state == "failed"
     decision = model.policy.decide(np.array(list(found.causes.values())), found.bald)
     assert (said.action, said.reason) == (decision.action, decision.reason)
-    assert f"state     failed: {' and '.join(found.named)}" in said.text()
+    assert f"state     {'probably ' * found.doubtful}failed: {' and '.join(found.named)}" in said.text()
     in_mm = with_threshold(model, 0.0).explain(*(1e3 * cloud for cloud in pair), unit="mm")
     assert in_mm.diagnosis.expected_error == pytest.approx(1e3 * found.expected_error, rel=0.1)
 

@@ -34,7 +34,7 @@ def test_a_free_direction_stands_in_the_state_of_a_right_result(shipped):
     assert (turn["motion"], round(abs(turn["axis"][2]), 1)) == ("turn", 1.0)
     assert np.array(words["reenacted"]["undetermined"]["covariance"]).shape == (6, 6)
     if words["state"] == "nominal":
-        assert f"state     nominal: nothing is wrong, but {TURN}" in said.text()
+        assert f"nominal: nothing is wrong, but {TURN}" in said.text()
     assert "free      turn about the target's z axis ± " in said.text()
     assert TURN[1:] in unescape(said.html())
 
