@@ -79,9 +79,32 @@ class Holding:
 Action = Callable[..., Holding]
 
 
-def reinitialize(holding: Holding, robot: Robot, random: np.random.Generator, starts: int = 64) -> Holding:
-    """Search all orientations by ICP with a larger reach, and start from the best of the results."""
-    return best_start(holding, robot, search(holding, robot, random, starts))
+def reinitialize(
+    holding: Holding, robot: Robot, random: np.random.Generator, starts: int = 64, posterior: bool = False
+) -> Holding:
+    """Search all orientations by ICP with a larger reach, and start from the best of the results.
+
+    With `posterior`, the probable poses of the re-enactment's search are among them.
+    """
+    poses = search(holding, robot, random, starts)
+    return best_start(holding, robot, [*poses, *(probable(holding, robot, random) if posterior else ())])
+
+
+def probable(holding: Holding, robot: Robot, random: np.random.Generator) -> list[np.ndarray]:
+    """Return the probable poses of what was measured, whatever its initial pose; none for few points."""
+    from gpca.alignment.methods.interface import Pair
+    from gpca.reenactment.registration import pose_posterior
+    from gpca.reenactment.settings import ReenactmentSettings
+
+    d = robot.diameter_m
+    cloud_m = fuse(holding.shots, d, holding.filtered)
+    if len(cloud_m) < FEWEST_POINTS:
+        return []
+    observed = cloud_m[random.permutation(len(cloud_m))[:MODEL_POINTS]] / d
+    model = robot.points_m[random.permutation(len(robot.points_m))[: 2 * MODEL_POINTS]].astype(np.float64) / d
+    T_start = scale_translation(inverse(holding.T_world_object), 1 / d)
+    poses, _ = pose_posterior(Pair(observed, model, T_start), ReenactmentSettings(), prior=False)
+    return [inverse(scale_translation(T, d)) for T in poses]
 
 
 def search(holding: Holding, robot: Robot, random: np.random.Generator, starts: int) -> list[np.ndarray]:

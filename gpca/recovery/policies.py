@@ -23,6 +23,7 @@ from gpca.recovery.chances import ExpectedUtility, FailureGate
 if TYPE_CHECKING:
     from gpca.recovery.reenactment import CauseEffects
 
+POSE = "pose"  # the concept whose treatment is a repair
 Order = tuple[str, ...]  # a sequence of actions
 SEQUENCE = "sequence"  # prefix of the names of fixed sequences, such as sequence_reinitialize_new_view
 ALWAYS = "always_"  # prefix of the names of policies that always take one action
@@ -170,6 +171,16 @@ def follow_truth(means: Means) -> Decide:
     return lambda case: Decision(treatments.get(case.cause, NOTHING), case.cause, "told the cause")
 
 
+def repairing(make: MakePolicy) -> MakePolicy:
+    """Let a policy choose only after the pose was searched anew, for which nothing in the world has to move."""
+
+    def make_repairing(means: Means) -> Decide:
+        decide, first = make(means), means.policy.treatments[POSE]
+        return lambda case: decide(case) if case.actions else Decision(first, "", "repair before anything moves")
+
+    return make_repairing
+
+
 def follow_sequence(order: Order, reason: str = "next of a fixed sequence") -> MakePolicy:
     """Take the actions of a sequence in turn, whatever is observed."""
     return lambda means: lambda case: Decision(order[len(case.actions) % len(order)], "", reason)
@@ -237,6 +248,8 @@ POLICIES = {
     "random": PolicyEntry("Random action", act_at_random),
     "round_robin": PolicyEntry("Round robin", act_in_turn),
     "oracle": PolicyEntry("Oracle cause", follow_truth, oracle=True),
+    "repair_gpca": PolicyEntry("Repair, then GP-CA, never queued", repairing(never_queue), explainer="gpca"),
+    "repair_oracle": PolicyEntry("Repair, then oracle cause", repairing(follow_truth), oracle=True),
 }
 
 

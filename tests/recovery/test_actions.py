@@ -15,9 +15,10 @@ from tests.failures import LOOP
 from ..documents import block
 
 
-def test_a_broader_search_finds_what_explains_the_shots(start):
+@pytest.mark.parametrize("settings", [{"starts": 48}, {"starts": 1, "posterior": True}])
+def test_a_broader_search_finds_what_explains_the_shots(start, settings):
     situation, outcome = start
-    found = ACTIONS["reinitialize"](outcome.holding, Robot(situation), np.random.default_rng(0), starts=48)
+    found = ACTIONS["reinitialize"](outcome.holding, Robot(situation), np.random.default_rng(0), **settings)
     assert register_held(situation, found, LOOP).error < outcome.error
     assert found.shots is outcome.holding.shots
 

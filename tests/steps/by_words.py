@@ -52,7 +52,7 @@ LISTS = {  # which names of a step are lists, and not of one seed, file or name
     "estimate": "seeds estimators estimates causes other_objects other_causes samples rows timings",
     "diagnose_frames": "causes descriptors reenactments encoders embeddings",
     "frame_labels": "backbones embeddings strategies out",
-    "gradients": "seeds registrations encoders embeddings deletions maps tcav",
+    "gradients": "seeds registrations encoders embeddings deletions tcav",
     "kernel_grid": "seeds registrations embeddings out predictions",
     "learning_curve": "samples",
     "live_shap": "seeds registrations outcomes out",

@@ -180,7 +180,7 @@ STEP_OPTIONS = {
         "--settings": {"gradients": {"samples": 3, "deleted": [0.25], "vectors": 2}, "encoder": ENCODER,
                        "gpc": FEW},
         "--seeds": 0, "--registrations": "registrations.npz", "--encoders": "weights.pt",
-        "--embeddings": "embeddings.npz", "--deletions": "deletions.csv", "--maps": "maps.npz", "--tcav": "tcav.csv",
+        "--embeddings": "embeddings.npz", "--deletions": "deletions.csv", "--tcav": "tcav.csv",
     },
     "without": COMMON | {
         "--settings": ENCODER | {"epochs": 1}, "--seed": 0, "--registrations": "registrations.npz",
