@@ -13,7 +13,6 @@ from gpca.causes.settings import GROUPS, DescriptorSettings
 from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.errors import InputError
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module, explainers
-from gpca.rigid import inverse
 
 GPC = {"learning_rate": 0.1, "iterations": 60, "inducing": 8, "draws": 50}
 FAST = {
@@ -30,17 +29,6 @@ COMMITTEES = {"pair_committee", "pair_committee_clouds", "reenact_committee"}
 NAMES = sorted(set(explainers(CAUSES)) - COMMITTEES)
 
 
-def hypotheses(causes):
-    """The true pose of each, from the initial pose of the observed cloud to the model; and one far off."""
-    registrations, aside = causes.registrations, np.eye(4)
-    aside[0, 3] = 0.2
-    T_S = [
-        registrations.T_target_source("true", row) @ inverse(registrations.T_target_source("init", row))
-        for row in range(len(causes))
-    ]
-    return np.stack([T_S, aside @ T_S], axis=1)
-
-
 @pytest.fixture(scope="module")
 def seen(causes):
     """Registrations with labels, descriptors and an embedding that tells the labels apart."""
@@ -53,7 +41,8 @@ def seen(causes):
     read = {"embedding": embedding, "head_logits": embedding[:, :4], **descriptors.groups}
     exponentials = np.exp(embedding[:, :4])
     read |= {"verdict": exponentials / exponentials.sum(axis=1, keepdims=True), "reenactment": embedding}
-    read |= {"hypotheses": hypotheses(causes), "weight": np.tile([0.7, 0.3], (len(causes), 1))}
+    off = np.column_stack([causes.error_shown, np.full(len(causes), 0.2)])  # were the truth or a pose far off true
+    read |= {"result_error": off, "weight": np.tile([0.7, 0.3], (len(causes), 1))}
     registrations = replace(registrations, attached={**registrations.attached, **read})
     return registrations.subset(np.flatnonzero(registrations.concept != BORDERLINE))
 
@@ -78,7 +67,7 @@ def test_scores_are_over_the_labels_and_depend_on_nothing_but_what_the_entry_say
     for group, columns in (shown for part in entry.sees for shown in COLUMNS.get(part, {}).items()):
         blind[group][:, columns] = seen.attached[group][:, columns]
     if "reenactment" in entry.sees:
-        blind |= {array: seen.attached[array] for array in ("verdict", "reenactment", "hypotheses", "weight")}
+        blind |= {array: seen.attached[array] for array in ("verdict", "reenactment", "result_error", "weight")}
     if entry.reads == "embeddings":
         blind |= {array: seen.attached[array] for array in ("embedding", "head_logits")}
     assert np.array_equal(explained(name, replace(seen, attached=blind)).scores_N_C, first.scores_N_C)
