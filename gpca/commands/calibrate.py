@@ -10,6 +10,7 @@ from pathlib import Path
 from gpca.commands.explain_inputs import COLUMNS, FILES, from_rows, inputs_in, target_reader
 from gpca.errors import InputError
 from gpca.io.files import require_apart
+from gpca.model.clouds import require_format
 from gpca.model.location import model_path, require_model
 from gpca.numerals import decimal
 from gpca.objects.surface import METERS_PER_UNIT
@@ -56,7 +57,8 @@ def run_calibrate(options: Namespace) -> None:
     for place, row in rows:
         try:
             inputs.append(inputs_in(row, options))
-            inputs[-1].require_formats()
+            for cloud in (inputs[-1].source, inputs[-1].target):
+                require_format(cloud)
         except InputError as fault:
             raise InputError(place, str(fault)) from fault
     from gpca.model.explainer import Explainer
