@@ -50,15 +50,19 @@ class Attribution:
     ) -> Attribution:
         """Make the attribution of an explainer; times and calls are one number for each row, or one for all."""
         n = len(require_numbers(scores_N_C, (None, len(concepts)), "scores_N_C"))
+        seconds, icp_seconds, icp_calls = (
+            require_numbers(np.broadcast_to(each, n), (n,), "seconds or calls")
+            for each in (seconds, icp_seconds, icp_calls)
+        )
         return cls(
             concepts=concepts,
             scores_N_C=scores_N_C,
             variances_N_C=np.full(scores_N_C.shape, np.nan) if variances_N_C is None else variances_N_C,
             bald_N=np.full(n, np.nan) if bald_N is None else bald_N,
             abstained_N=np.zeros(n, bool) if abstained_N is None else abstained_N,
-            icp_calls_N=np.broadcast_to(icp_calls, n).astype(int),
-            seconds_N=np.broadcast_to(seconds, n).astype(float),
-            icp_seconds_N=np.broadcast_to(icp_seconds, n).astype(float),
+            icp_calls_N=icp_calls.astype(int),
+            seconds_N=seconds.astype(float),
+            icp_seconds_N=icp_seconds.astype(float),
         )
 
     def in_order(self, concepts: tuple[str, ...]) -> Attribution:

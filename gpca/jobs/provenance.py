@@ -89,7 +89,7 @@ def read_record(path: Path) -> dict[str, Any]:
         return {}
     content = read_json(record, "a provenance record", remedy)
     for name, kind in _FIELDS.items():
-        content[name] = content.get(name) or kind()
+        content[name] = kind() if content.get(name) is None else content[name]
         if not isinstance(content[name], kind):
             raise InputError(record, f"'{name}' is no {kind.__name__}", remedy)
     texts = [each for name in ("config_sha256", "libraries", "code") for each in content[name].values()]

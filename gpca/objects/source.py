@@ -68,8 +68,7 @@ def resolve(entry: dict, data_dir: str | None) -> dict:
             continue
         if not (folder.is_dir() or folder.is_file()):
             raise InputError(folder, "is neither a folder nor a file", "correct location in the config")
-        if folder.resolve() == Path(folder.resolve().anchor):
-            raise InputError(folder, "is the root of the file system", "name a folder of data in the config")
+        require_no_root(folder)
         if entry.get("location") or all(any(folder.glob(pattern)) for pattern in patterns):
             require_whole_if_ours(folder)
             if require_entry := getattr(module, "require_entry", None):
@@ -83,6 +82,12 @@ def resolve(entry: dict, data_dir: str | None) -> dict:
         message = f"has {len(urls)} url(s) but {len(checksums)} sha256 value(s)"
         raise InputError(subject, message, "give one for each, or null")
     return {**entry, "origin": "download"}
+
+
+def require_no_root(folder: Path) -> None:
+    """Raise an InputError for the root of the file system, whose files would all be searched."""
+    if folder.resolve() == Path(folder.resolve().anchor):
+        raise InputError(folder, "is the root of the file system", "name a folder of data in the config")
 
 
 def surfaces(entry: dict, cache_folder: str | Path) -> Iterator[Surface]:

@@ -24,7 +24,7 @@ from gpca.numerals import decimal, whole
 from gpca.objects.canonical import require_points
 from gpca.objects.entry import Place, Text, Unit
 from gpca.objects.mesh_folder import read_surface
-from gpca.objects.source import places_of
+from gpca.objects.source import places_of, require_no_root
 from gpca.objects.surface import meters_per
 from gpca.rigid import require_rigid, scale_translation
 from gpca.scans.pair import Kind
@@ -260,6 +260,7 @@ def place_of(entry: ScanEntry, data_dir: str | None) -> Path | None:
         return None
     places = places_of(entry.location or "", data_dir)
     if place := next((place for place in places if place.exists()), None):
+        require_no_root(place)
         return place
     if entry.optional:
         return None

@@ -203,6 +203,7 @@ HEAD, TABLE_HEAD = ",".join(TIDY) + "\n", ",".join(HEADS) + "\n"
         (TABLE, TABLE_HEAD + "ycb,gpca,,,,5,100,False\n", "has no mean at all"),
         (TABLE, TABLE_HEAD + "ycb,gpca,1,1,2,5,-100,False\n", "counts fewer than no samples or seeds"),
         ("metrics.csv.provenance.json", '{"config_sha256": [1]}', "'config_sha256' is no dict; make metrics.csv again"),
+        ("metrics.csv.provenance.json", '{"device": []}', "'device' is no dict"),
         ("metrics.csv.provenance.json", '{"device": ', "is not a provenance record"),
         (TABLE, TABLE_HEAD + "ycb,gpca,many,1,2,5,100,False\n", "'mean' is 'many', not a finite number"),
     ],

@@ -81,6 +81,11 @@ OTHER_LABELS = "    labels = ('noise', 'pose', 'overlap', {})\n" + SUMMARY.forma
         (SUMMARY.format("np.full((n, 4), np.longdouble('1e4000'))"), "has type float128"),
         (SUMMARY.format("np.zeros((n, 4), 'M8[s]')"), "has type datetime64[s]"),
         (SUMMARY.format("np.full((n, 4), np.nan)"), "contains NaN"),
+        (
+            "    def explain(self, registrations):\n        from gpca.classifier.scores import Attribution\n"
+            "        return Attribution.of_scores(LABELS, np.zeros((20, 4)), seconds=1j)\n",
+            "seconds or calls: has type complex128",
+        ),
         (OTHER_LABELS.format("'fog'"), "scores noise, pose, overlap, fog; score nominal, noise, pose, overlap"),
         (OTHER_LABELS.format("'pose'"), "concepts: are ('noise', 'pose', 'overlap', 'pose'); give different names"),
         ("    def explain(self, registrations):\n        return 5\n", "answers with a int"),
