@@ -33,3 +33,22 @@ def accepted_below(
     last_n = np.append(np.diff(score_n) > 0, np.ones(len(score_n[:1]), bool))  # equal scores are accepted together
     kept = np.flatnonzero((bound_n <= risk) & last_n)
     return float(np.nextafter(score_n[kept[-1]], np.inf)) if len(kept) else None
+
+
+def accepted_in_hindsight(
+    score_N: np.ndarray, wrong_N: np.ndarray, weights_B_N: np.ndarray, risk: float = WRONG
+) -> np.ndarray:
+    """Return which poses (B, N) are accepted by the largest limit at which at most the share `risk` of them is wrong.
+
+    The limits are those of these very poses, for each of B weights, and promise nothing; infinite scores are never
+    accepted.
+    """
+    order = np.argsort(score_N, kind="stable")
+    weights_B_n, score_n = weights_B_N[:, order] * np.isfinite(score_N[order]), score_N[order]
+    total_B_n, off_B_n = np.cumsum(weights_B_n, axis=1), np.cumsum(weights_B_n * wrong_N[order], axis=1)
+    last_n = np.append(score_n[1:] > score_n[:-1], np.ones(len(score_n[:1]), bool))
+    allowed_B_n = (off_B_n <= risk * total_B_n) & (total_B_n > 0) & last_n & np.isfinite(score_n)
+    count_B = np.where(allowed_B_n.any(axis=1), len(order) - allowed_B_n[:, ::-1].argmax(axis=1), 0)
+    accepted_B_N = np.zeros(weights_B_N.shape, bool)
+    accepted_B_N[:, order] = np.arange(len(order)) < count_B[:, None]
+    return accepted_B_N

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.special import logit
 
-from gpca.guarantee.acceptance import accepted_below
+from gpca.guarantee.acceptance import accepted_below, accepted_in_hindsight
 from gpca.io.csv_file import write_csv
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
@@ -26,6 +27,7 @@ CAUSES, HARD = "causes", "hard"  # tracks whose families judges and limits come 
 JUDGED = "judged"  # after a rival's name: its pose is accepted by the judge
 FALSE_ALARMS = 0.05  # share of the good registrations of other families that are called failed
 COLUMNS = ("failed", "called", "replaced", "right", "right_pose", "several")
+SCORE = "score"  # by which a pose is accepted; the smaller, the surer
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,7 @@ def verdicts(attempts: Mapping[str, Sequence[tuple[str, int, Attempts]]], tolera
                 for method, outcome in decided(each, row, limits, tolerance):
                     named = (track, source, seed, each.sample_N[row], each.group_N[row], each.cluster_N[row])
                     frames.append((*named, each.label_N[row], each.points_N[row], method, *outcome))
-    names = ("track", "source", "seed", "sample", "group", "cluster", "label", "points", "method", *COLUMNS)
+    names = ("track", "source", "seed", "sample", "group", "cluster", "label", "points", "method", *COLUMNS, SCORE)
     return pd.DataFrame(frames, columns=list(names))
 
 
@@ -82,12 +84,10 @@ def learn_limits(learned: Attempts, tolerance: float) -> Limits:
         wrong_n = rivals.error_N_P[called, m] > tolerance
         family_n, score_n_Q = learned.family_N[called], learned.score_N_M_Q[called, m]
         below_Q = [accepted_below(score_n, wrong_n, family_n) for score_n in score_n_Q.T]
-        # As many as are repaired there decide on the test.
-        gain_Q = [
-            -1 if below is None else int(((score_n < below) & ~wrong_n & off_N[called]).sum())
-            for score_n, below in zip(score_n_Q.T, below_Q, strict=True)
-        ]
-        best = int(np.argmax(gain_Q))
+        # The test that would repair most there, were its limit known.
+        once, repaired_n = np.ones((1, len(called))), ~wrong_n & off_N[called]
+        accepted_Q_n = [accepted_in_hindsight(score_n, wrong_n, once)[0] for score_n in score_n_Q.T]
+        best = int(np.argmax([(accepted_n & repaired_n).sum() for accepted_n in accepted_Q_n]))
         tests[name] = best, below_Q[best]
         judged_n = judged_N_M[called, m]
         tests[f"{name}_{JUDGED}"] = len(TESTS), accepted_below(judged_n, wrong_n, family_n)
@@ -104,14 +104,22 @@ def decided(each: Attempts, row: int, limits: Limits, tolerance: float) -> Itera
     right_P = error_P <= tolerance
     replaced, best = verdict.name == REPAIRED, 1 + int(verdict.probability_n[1:].argmin())
     several = verdict.name == SEVERAL and bool(right_P[list(verdict.rows)].any())
-    yield REPAIR, (failed, called, replaced, bool(replaced and right_P[best]), bool(right_P[best]), several)
+    right = bool(right_P[best])
+    yield REPAIR, (failed, called, replaced, replaced and right, right, several, log_odds(verdict.probability_n[best]))
     judged_M = rivals.probabilities(limits.judge, tolerance)[0]
     for m, name in enumerate(each.method_M.tolist()):
         for method in (name, f"{name}_{JUDGED}"):
             test, below = limits.tests[method]
-            score = judged_M[m] if test == len(TESTS) else alone.score_N_M_Q[0, m, test]
+            by_judge = test == len(TESTS)
+            score = float(judged_M[m] if by_judge else alone.score_N_M_Q[0, m, test])
             replaced, right = bool(called and below is not None and score < below), bool(error_M[m] <= tolerance)
-            yield method, (failed, called, replaced, replaced and right, right, False)
+            shown = log_odds(score) if by_judge else score
+            yield method, (failed, called, replaced, replaced and right, right, False, shown)
+
+
+def log_odds(probability: float) -> float:
+    """Return what keeps the order of small probabilities in a file of few decimals."""
+    return float(logit(np.clip(probability, 1e-12, 1 - 1e-12)))
 
 
 def run(job: Job) -> None:
@@ -124,4 +132,4 @@ def run(job: Job) -> None:
             track: [(path.parent.name, int(path.stem.removeprefix("seed")), Attempts.load(path)) for path in paths]
             for track, paths in files.items()
         }
-        write_csv(job.verdicts, verdicts(attempts, job.settings["tolerance"]))
+        write_csv(job.verdicts, verdicts(attempts, job.settings["tolerance"]), form="%.9g")

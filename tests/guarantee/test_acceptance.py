@@ -5,7 +5,7 @@ from math import inf
 import numpy as np
 import pytest
 
-from gpca.guarantee.acceptance import accepted_below
+from gpca.guarantee.acceptance import accepted_below, accepted_in_hindsight
 
 
 def drawn(random, families, size=12):
@@ -43,3 +43,11 @@ def test_equal_scores_are_accepted_together_and_infinite_ones_never():
     wrong_N[40:60] = True
     assert accepted_below(score_N, wrong_N, family_N) == pytest.approx(0.1)
     assert accepted_below(score_N[:0], wrong_N[:0], family_N[:0]) is None
+
+
+def test_in_hindsight_the_largest_limit_with_few_wrong_counts_for_each_weight():
+    score_N, wrong_N = np.array([3.0, 1, 2, 2, inf]), np.array([False, False, True, False, False])
+    weights_B_N = np.array([[1.0] * 5, [1, 1, 0, 1, 1], [0, 0, 1, 0, 0]])
+    accepted_B_N = accepted_in_hindsight(score_N, wrong_N, weights_B_N, risk=0.3)
+    assert accepted_B_N.tolist() == [[True] * 4 + [False], [True] * 4 + [False], [False] * 5]
+    assert accepted_in_hindsight(score_N, wrong_N, weights_B_N, risk=0.2)[0].tolist() == [False, True] + [False] * 3
