@@ -18,6 +18,7 @@ from gpca.alignment.methods.registry import make_method
 from gpca.causes.settings import MODEL, Moved
 from gpca.model.result import Calibrated, Evidence, ResultJudge
 from gpca.pairs.distances import ObservedPair
+from gpca.reenactment.enactment import whole_surface
 from gpca.reenactment.hypotheses import (
     FEWEST_INLIERS,
     LAST_ITERATIONS,
@@ -90,7 +91,8 @@ def propose(
     apart_k_n = np.stack([surface.apart(T_k @ inverse(T_k[row])) for row in rows], axis=1)
     weight_n = np.bincount(apart_k_n.argmin(axis=1), weight_K[possible], minlength=len(rows))
     T_n = np.concatenate([T_registered[None], T_k[rows]])
-    distance_n_K = np.stack([surface.errors(T @ inverses(T_K)) for T in T_n])
+    whole = whole_surface(observed, surface, T_K[possible[0]])
+    distance_n_K = np.stack([whole.errors(T @ inverses(T_K)) for T in T_n])
     fitness_n, rmse_n = measure(T_n)
     evidence = Evidence(distance_n_K, np.tile(weight_K, (len(T_n), 1)), rmse_n, fitness_n)
     return Proposals(T_n, np.append(0.0, weight_n), evidence)

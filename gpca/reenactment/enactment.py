@@ -18,7 +18,8 @@ from gpca.causes.candidate import Candidate, Counterfactuals, Registrar, Unmeasu
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import LARGEST_ERROR, SUBSETS, shapley_values
 from gpca.pairs.distances import ObservedPair
-from gpca.reenactment.hypotheses import Hypothesis, find_hypotheses
+from gpca.reenactment.hypotheses import LAST_ITERATIONS, Hypothesis, find_hypotheses
+from gpca.reenactment.mixture import Mixture
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface, covered_points, trimmed_square
 from gpca.rigid import inverse, transform
@@ -132,6 +133,24 @@ def rebuild(T: np.ndarray, observation: Observation, surface: ModelSurface, rand
     )
 
 
+def completed(surface: ModelSurface, observation: Observation) -> ModelSurface:
+    """Return the surface with what was observed of the part that the model lacks, if it lacks any."""
+    if observation.is_lone.mean() < LEAST_LACKING:
+        return surface
+    return surface.completed(observation.points[observation.is_lone], observation.noise)
+
+
+def whole_surface(observed: np.ndarray, surface: ModelSurface, T: np.ndarray) -> ModelSurface:
+    """Return the surface as observed points (N, 3) at the likeliest pose complete it, by which errors are measured."""
+    fits = Mixture(surface.points, surface.spacing / 2).fit(observed, T[None], LAST_ITERATIONS, moving=False)
+    matched_N, lone_N = fits.inlier_n_N[0], fits.lone_n_N[0]
+    hypothesis = Hypothesis(
+        T, matched_N + lone_N, float(fits.log_likelihood_n[0]), float(fits.width_n[0]), 1, 0, lone_N
+    )
+    random = generator("whole surface")
+    return completed(surface, observe(observed, hypothesis, surface, NoiseScale(surface, random), random))
+
+
 def fresh_points(surface: ModelSurface, rows: np.ndarray, count: int, random: np.random.Generator) -> np.ndarray:
     """Return points (count, 3) of the surface around some of the model's points."""
     chosen = random.choice(rows, size=count, replace=count > len(rows))
@@ -172,8 +191,8 @@ def reenact(
     enactments: list[Enactment] = []
     for hypothesis in hypotheses:
         observation = observe(before, hypothesis, surface, scale, random)
-        if not enactments and observation.is_lone.mean() >= LEAST_LACKING:
-            whole = surface.completed(observation.points[observation.is_lone], observation.noise)
+        if not enactments:
+            whole = completed(surface, observation)
         candidate = rebuild(hypothesis.T, observation, surface, random)
         enactments.append(enact(hypothesis, candidate, whole.errors, pair.axes, truth))
     return enactments

@@ -36,6 +36,7 @@ from gpca.pairs.distances import ObservedPair
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
 from gpca.reenactment.dataset import Reenactments
+from gpca.reenactment.enactment import whole_surface
 from gpca.reenactment.hypotheses import search_starts
 from gpca.reenactment.scans import REACH
 from gpca.reenactment.settings import ReenactmentSettings
@@ -231,7 +232,8 @@ def try_all(
         tried += [rival.by_function(name, function) for name, function in functions.items()]
         T_M = np.array([each.T for each in tried])
         fitness_M, rmse_M = measured(rival.before, pair.model, icp, moved)(T_M)
-        distance_M_K = np.stack([surface.errors(T @ inverses(T_K)) for T in T_M])
+        whole = whole_surface(rival.before, surface, T_K[np.argmax(weight_K)])
+        distance_M_K = np.stack([whole.errors(T @ inverses(T_K)) for T in T_M])
         score_M_Q = np.array([each.score_Q for each in tried])
         columns.append((world.errors(row, T_M), distance_M_K, rmse_M, fitness_M, score_M_Q))
         spent = {REPAIR: rival.repair_seconds} | {each.name: each.seconds for each in tried}
