@@ -76,16 +76,17 @@ class Loop:
 
     @cached_property
     def _machine_code(self) -> Any:
-        serial = not self.options.get("parallel") or os.environ.get("NUMBA_NUM_THREADS", "1") == "1"
-        loops = library() if self.ahead and serial else None
+        loops = library() if self.ahead and not (self.options.get("parallel") and has_threads()) else None
         return loops and loops[self.symbol]
 
     @cached_property
     def dispatcher(self) -> Any:
-        """What numba makes of the function."""
-        if self.options.get("parallel"):
+        """What numba makes of the function; for one thread, in half the time and with the same bits."""
+        options = dict(self.options)
+        if options.get("parallel"):
             self.py_func.__globals__["prange"] = numba().prange
-        return numba().njit(**self.options)(self.py_func)
+            options["parallel"] = has_threads()
+        return numba().njit(**options)(self.py_func)
 
 
 def njit(ahead: str = "", **options: Any) -> Callable[[Callable[..., Any]], Loop]:
@@ -97,6 +98,11 @@ def njit(ahead: str = "", **options: Any) -> Callable[[Callable[..., Any]], Loop
         options: of numba.
     """
     return lambda function: Loop(function, ahead, options)
+
+
+def has_threads() -> bool:
+    """Return whether loops of this process are shared out to threads."""
+    return os.environ.get("NUMBA_NUM_THREADS", "1") != "1"
 
 
 def _unfold(argument: Any, numbers: list[Any]) -> str:

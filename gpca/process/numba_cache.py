@@ -19,6 +19,7 @@ from numba.core.event import Listener, register
 from numba.extending import typeof_impl
 
 from gpca.process.code_files import ROOT, code_files
+from gpca.process.compilation import has_threads
 
 __all__ = ["Compilations", "njit", "prange", "register", "typeof_impl", "types"]
 
@@ -29,9 +30,10 @@ def _cache_folder() -> Path:
     loops = [path for path in sorted(ROOT.glob("gpca/**/*.py")) if b"njit" in path.read_bytes()]
     modules = (".".join(path.relative_to(ROOT).with_suffix("").parts) for path in loops)
     code = b"".join(Path(file).read_bytes() for file in code_files(*modules))
-    state = f"loops-{hashlib.sha256(code).hexdigest()[:16]}"
+    kind = "parallel" if has_threads() else "serial"  # of which numba's own names of loops say nothing
+    state = f"loops-{kind}-{hashlib.sha256(code).hexdigest()[:16]}"
     if given := os.environ.get(VARIABLE):  # by the user, or by the parent process with the state
-        return Path(given) if Path(given).name == state else Path(given, state)
+        return (Path(given).parent if Path(given).name.startswith("loops-") else Path(given)) / state
     user = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
     for folder in (Path(__file__).parent / "__pycache__", user / "gpca"):
         try:

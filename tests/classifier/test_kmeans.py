@@ -15,9 +15,16 @@ KINDS = {  # of samples (n, d)
 }
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("n", "d", "kind"),
+    [
+        *((n, d, kind) for n, d in ((2, 2), (9, 17), (40, 3), (300, 17)) for kind in KINDS),
+        (600, 1024, "even"),
+        (600, 1024, "clustered"),
+        (700, 256, "even"),
+    ],
+)
 @pytest.mark.parametrize("precision", [np.float32, np.float64])
-@pytest.mark.parametrize(("n", "d"), [(2, 2), (9, 17), (40, 3), (300, 17), (600, 1024), (700, 256)])
 def test_centers_are_those_of_scikit_learn(n, d, precision, kind):
     random = np.random.default_rng(n + d)
     x_n_d = KINDS[kind](random, random.normal(size=(n, d))).astype(precision)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gpca.process.compilation import MODULES, NOTICE, REMEDY, Loop, library
+from gpca.process.compilation import MODULES, NOTICE, OVER_CLOUDS, REMEDY, Loop, library
 from gpca.process.processor import may_pin
 from tests.documents import ROOT
 
@@ -33,6 +33,8 @@ def package(tmp_path):
         "__init__.py",
         "process/code_files.py",
         "errors.py",
+        "io/__init__.py",
+        "io/files.py",
         "process/plugins.py",
         "process/__init__.py",
         "process/compilation.py",
@@ -65,6 +67,15 @@ def test_loops_are_kept_beside_the_module_or_where_the_variable_says(package, tm
 def test_a_process_keeps_to_the_folder_of_its_parent(package, tmp_path):
     folder = imported(package, NUMBA_CACHE_DIR=str(tmp_path / "mine")).stdout
     assert imported(package, NUMBA_CACHE_DIR=folder.strip()).stdout == folder
+    of_two_threads = folder_of(package, NUMBA_CACHE_DIR=folder.strip(), NUMBA_NUM_THREADS="2")
+    assert of_two_threads == tmp_path / "mine"
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_loop_over_clouds_is_shared_out_where_there_are_threads_for_it(monkeypatch, threads):
+    monkeypatch.setenv("NUMBA_NUM_THREADS", str(threads))
+    loop = Loop(lambda x: x, "", OVER_CLOUDS | {"cache": False})
+    assert loop.dispatcher.targetoptions["parallel"] == (threads == 2)
 
 
 @pytest.mark.parametrize("theirs", [False, True])

@@ -83,7 +83,7 @@ def test_unit_of_length_and_sign_of_normals_do_not_matter_and_flat_clouds_are_dr
 def test_a_sheet_is_as_wide_as_the_text_and_the_same_bytes_each_time(tmp_path, same_bytes):
     objects = _write_objects(tmp_path / "balls.npz", ["025_mug", "a_ball"])
     image = same_bytes(lambda: draw_contact_sheet(objects, "Balls (procedural stand-in)"))
-    assert abs(image.shape[1] - 7.16 * 300) <= 1
+    assert abs(image.shape[1] - 7.16 * 100) <= 1
     assert (image[:, :, :3].min(axis=2) < 230).any()
 
 
