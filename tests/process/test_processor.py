@@ -56,7 +56,7 @@ GUARDED = PREPARED + "from tests.vendor_guard import main; sys.exit(main())"
 LEFT_OUT = {"label", "runtime", "explain"}  # they give seconds, or text
 # Files of seconds; and a model's and an explanation's provenance.
 SECONDS = {"icp.csv", "dgcnn.csv", "gpca.csv", "uncertainty_timings.csv", "other_icp.csv", "frame_icp.csv"}
-SECONDS |= {"causes_timings.csv", "descriptors.csv", "cause_embeddings.csv", "diagnosis_timings.csv"}
+SECONDS |= {"causes_timings.csv", "descriptors.csv", "cause_embeddings.csv", "diagnosis_timings.csv", "repairs.csv"}
 
 needs_the_level = pytest.mark.skipif(
     not processor._flags() >= processor._REQUIRED_FLAGS, reason="needs a processor with AVX2 and FMA"
@@ -150,8 +150,8 @@ def test_two_processors_give_the_same_bytes_and_would_not_without_the_pins(here,
     # A step without loops: those would be compiled again.
     shutil.copytree(folder, tmp_path / "native")
     variables = OTHER_PROCESSOR | {INSTRUCTIONS_VARIABLE: "native"}
-    native, _ = made_on(tmp_path / "native", [arguments("attribute")], **variables)
-    assert {name for name in own if own[name] != native[name]} == {"predictions.csv"}
+    native, _ = made_on(tmp_path / "native", [arguments("reduce")], **variables)
+    assert {name for name in own if own[name] != native[name]} == {"reduced.npz"}
 
 
 @needs_the_level
