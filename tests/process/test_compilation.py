@@ -189,7 +189,7 @@ def test_the_library_has_the_bits_of_numba(monkeypatch):
     """Every loop is called by what it is for, twice: by the library, and by numba on copies."""
     from gpca.alignment.batched_icp import BatchedICP, BatchedPlaneICP, ICPSettings, make_target, pulls
     from gpca.encoders import edge_kernels
-    from gpca.reenactment.mixture import Anchor, Mixture
+    from gpca.reenactment.mixture import Anchor, Mixture, densities_of
     from gpca.reenactment.surface import ModelSurface, share_within
 
     by_library, ran = Loop.__call__, set()
@@ -217,6 +217,7 @@ def test_the_library_has_the_bits_of_numba(monkeypatch):
     pulls(make_target(model, 0.1), observed, poses)
     for moving, anchor in ((True, None), (True, Anchor(0.3, 0.1)), (False, None)):
         Mixture(model, 0.01).fit(observed, poses, 10, moving, anchor)
+    Mixture(model, 0.01).fit(observed, poses, 10, densities=densities_of(observed, model))
     surface = ModelSurface(model)
     surface.residuals(observed)
     surface.distances(observed)
