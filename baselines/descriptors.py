@@ -188,8 +188,8 @@ class Result(Alarm):
         return even_scores(self._judge.probability(self._evidence(registrations), DEFAULT_TOLERANCE))
 
     def _evidence(self, registrations: Registrations) -> Evidence:
-        enacted = (attached(registrations, name) for name in ("result_error", "weight"))
-        return Evidence(*enacted, registrations.inlier_rmse, registrations.fitness)
+        error_N_K, weight_N_K = attached(registrations, "result_error"), attached(registrations, "weight")
+        return Evidence(error_N_K, weight_N_K, registrations.inlier_rmse, registrations.fitness)
 
 
 def even_scores(failure_N: np.ndarray) -> np.ndarray:
