@@ -48,7 +48,7 @@ def accepted_in_hindsight(
     total_B_n, off_B_n = np.cumsum(weights_B_n, axis=1), np.cumsum(weights_B_n * wrong_N[order], axis=1)
     last_n = np.append(score_n[1:] > score_n[:-1], np.ones(len(score_n[:1]), bool))
     allowed_B_n = (off_B_n <= risk * total_B_n) & (total_B_n > 0) & last_n & np.isfinite(score_n)
-    count_B = np.where(allowed_B_n.any(axis=1), len(order) - allowed_B_n[:, ::-1].argmax(axis=1), 0)
+    count_B = (allowed_B_n * np.arange(1, len(order) + 1)).max(axis=1, initial=0)
     accepted_B_N = np.zeros(weights_B_N.shape, bool)
     accepted_B_N[:, order] = np.arange(len(order)) < count_B[:, None]
     return accepted_B_N

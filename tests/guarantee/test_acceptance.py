@@ -51,3 +51,4 @@ def test_in_hindsight_the_largest_limit_with_few_wrong_counts_for_each_weight():
     accepted_B_N = accepted_in_hindsight(score_N, wrong_N, weights_B_N, risk=0.3)
     assert accepted_B_N.tolist() == [[True] * 4 + [False], [True] * 4 + [False], [False] * 5]
     assert accepted_in_hindsight(score_N, wrong_N, weights_B_N, risk=0.2)[0].tolist() == [False, True] + [False] * 3
+    assert accepted_in_hindsight(score_N[:0], wrong_N[:0], weights_B_N[:, :0]).shape == (3, 0)
