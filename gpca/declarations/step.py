@@ -124,10 +124,7 @@ def rules_of(step: Step, plan: Plan) -> list[Rule]:
     name, outside_of = step.apart
     outside = list(outside_of(plan))
     inside = [value for value in plan.names[_source(step, name)] if value not in outside]
-    return [
-        _rule(step, _with(plan, step, name, inside), step.name),
-        _rule_outside(step, plan, name, outside),
-    ]
+    return [_rule(step, _with(plan, step, name, inside), step.name), _rule_outside(step, plan, name, outside)]
 
 
 def plural(name: str) -> str:

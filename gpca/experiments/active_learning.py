@@ -8,13 +8,7 @@ from typing import Any
 
 from gpca.active_learning.acquisition import STREAMS, require_strategy, strategies, strategy_module
 from gpca.active_learning.curves import TABLE, collect_curves
-from gpca.active_learning.settings import (
-    LOOK_EVERY,
-    ActiveLearningSettings,
-    RareSettings,
-    StreamSettings,
-    rare_setting,
-)
+from gpca.active_learning.settings import LOOK_EVERY, ActiveLearningSettings, RareSettings, StreamSettings, rare_setting
 from gpca.declarations.experiment import Experiment, LeftOut, Names
 from gpca.declarations.plan import Run
 from gpca.declarations.result import Figure, Frame, Paths, figure, numbers, table

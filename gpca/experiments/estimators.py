@@ -20,14 +20,7 @@ from gpca.evaluation.measures import source_method_seed, tidy
 from gpca.io import csv_file
 from gpca.process.plugins import is_outside
 from gpca.settings import part_of
-from gpca.uncertainty.estimates import (
-    KINDS,
-    MILD,
-    OTHER_SOURCE,
-    REFERENCES,
-    EstimatorPairSettings,
-    read_estimate_files,
-)
+from gpca.uncertainty.estimates import KINDS, MILD, OTHER_SOURCE, REFERENCES, EstimatorPairSettings, read_estimate_files
 from gpca.uncertainty.estimators import registry
 
 

@@ -34,11 +34,7 @@ FRAME_FILES = {
     label_files="frame_labels/{frames}/{new_concept_strategy}/seed{frame_label_seed}.csv",
 )
 def collect(
-    run: Run,
-    prediction_files: Paths,
-    pose_files: Paths,
-    one_encoder_files: Paths = (),
-    label_files: Paths = (),
+    run: Run, prediction_files: Paths, pose_files: Paths, one_encoder_files: Paths = (), label_files: Paths = ()
 ) -> Frame:
     """Metrics by seed of prediction files.
 

@@ -116,11 +116,7 @@ DIAGNOSE_FRAMES_OUTSIDE = replace(
     outside_files="frame_diagnoses/{outside_explainer}/seed{frame_cause_seed}.csv",
 )
 def collect(
-    run: Run,
-    causes_files: Paths,
-    sample_files: Paths,
-    prediction_files: Paths,
-    outside_files: Paths = (),
+    run: Run, causes_files: Paths, sample_files: Paths, prediction_files: Paths, outside_files: Paths = ()
 ) -> Frame:
     """Measures of explainers that learned from no frame, with intervals; the source is ``real_rgbd/{kind of start}``.
 

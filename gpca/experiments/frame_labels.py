@@ -110,9 +110,7 @@ def table6_labels(run: Run, metrics: Frame) -> Table:
     percents = [in_percent(target) for target in section["targets"]]
     columns = {
         f"{strategy}_{percent}": Show(
-            title.format(percent),
-            where={"metric": "labels_to_target", "method": strategy, "target": percent},
-            **COUNT,
+            title.format(percent), where={"metric": "labels_to_target", "method": strategy, "target": percent}, **COUNT
         )
         for percent in percents
         for strategy, title in STRATEGIES.items()

@@ -243,11 +243,7 @@ def draw_real_world_confusions(run: Run, metrics: Frame) -> Figure:
     predictions_csv="predictions/{frames}/{first_backbone}/seed{seed}.csv",
 )
 def draw_real_world_failures(
-    run: Run,
-    objects_npz: str | Path,
-    registrations_npz: Sequence[str | Path],
-    poses_csv: Paths,
-    predictions_csv: Paths,
+    run: Run, objects_npz: str | Path, registrations_npz: Sequence[str | Path], poses_csv: Paths, predictions_csv: Paths
 ) -> Figure:
     """The test samples of all seeds that were attributed wrongly with the highest score, one of each instance.
 

@@ -46,10 +46,7 @@ FOLLOW = Step(
         "encoders": "encoders/{source}/{gradient_encoder}/seed{*seed}.pt",
         "embeddings": "embeddings/{source}/{gradient_encoder}/none/seed{*seed}.npz",
     },
-    outputs={
-        "deletions": "saliency/{source}/seed{*seed}.csv",
-        "tcav": "tcav/{source}/seed{*seed}.csv",
-    },
+    outputs={"deletions": "saliency/{source}/seed{*seed}.csv", "tcav": "tcav/{source}/seed{*seed}.csv"},
     settings=lambda plan, wildcards: {
         "gradients": plan.config["gradients"],
         "encoder": plan.encoder,

@@ -85,13 +85,7 @@ class LabeledRegistrations:
             states = WHETHER_FAILED
             scores_N_K, state_N = whether_failed(scores_N_K), np.where(self._right_N, *WHETHER_FAILED)
         guarantee = calibrate(
-            scores_N_K,
-            state_N,
-            self.group_N,
-            states=states,
-            level=LEVEL,
-            missed=self.risk,
-            false_alarms=self.risk,
+            scores_N_K, state_N, self.group_N, states=states, level=LEVEL, missed=self.risk, false_alarms=self.risk
         )
         guarantee = replace(guarantee, labeled=True)
         threshold = guarantee.within(threshold_of(result_N[self._right_N], self.risk))

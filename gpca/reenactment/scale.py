@@ -82,10 +82,7 @@ def find_scale(
 
 
 def scale_of(
-    placed: Sequence[np.ndarray],
-    surface: ModelSurface,
-    random: np.random.Generator,
-    convincing: float = CONVINCING,
+    placed: Sequence[np.ndarray], surface: ModelSurface, random: np.random.Generator, convincing: float = CONVINCING
 ) -> Scale:
     """Return the scale of an observed cloud that poses have placed in the model, each (N, 3)."""
     mixture = Mixture(surface.points, surface.spacing / 2)

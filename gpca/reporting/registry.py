@@ -150,11 +150,7 @@ def expand(patterns: tuple[str, ...], names: Names) -> list[str] | str:
 
 
 def build(
-    builder: str,
-    readers: Mapping[str, Mapping],
-    files: Mapping[str, Any],
-    arguments: Mapping[str, Any],
-    run: Any,
+    builder: str, readers: Mapping[str, Mapping], files: Mapping[str, Any], arguments: Mapping[str, Any], run: Any
 ) -> Any:
     """Read the inputs (:attr:`Result.readers`, :meth:`Result.files`) and call the builder: run, inputs, arguments."""
     inputs = {}

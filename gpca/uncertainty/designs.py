@@ -19,16 +19,7 @@ from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS, SEVERITIES
 from gpca.process.progress import progress
 from gpca.seeds import generator, seed_of
-from gpca.uncertainty.interventions import (
-    MIDDLE,
-    UNTOUCHED,
-    UPPER,
-    Clouds,
-    KnobRuns,
-    Knobs,
-    PairDraws,
-    RemedyRuns,
-)
+from gpca.uncertainty.interventions import MIDDLE, UNTOUCHED, UPPER, Clouds, KnobRuns, Knobs, PairDraws, RemedyRuns
 from gpca.uncertainty.outcomes import Outcomes
 from gpca.uncertainty.settings import CONDITIONS, CORNERS, LATIN, SALTELLI, Remedies, UncertaintySettings
 from gpca.uncertainty.spread import Spread, divergence
