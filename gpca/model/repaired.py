@@ -158,35 +158,44 @@ class Repair(ExplainedRegistration):
         verdict = decide(diagnoser.judge, level, proposals, tolerance, lost)
         errors_n = diagnoser.judge.error(proposals.evidence)
         poses = [pose.outside(frame, T_init) for pose in other_poses(proposals, verdict, errors_n, surface)]
+        T_best = proposals.T_n[verdict.row or 1]
         if verdict.name != GOOD:
-            T_best = proposals.T_n[verdict.row or 1]
             outliers, missing = unseen(clouds.source, surface, T_best)
             free = undetermined_at(transform(T_best, before), surface)
             spread = PoseSpread(free.covariance, frame.diameter, SURFACE, None)
             parts: dict[str, Any] = {"free": free.outside(frame), "spread": spread}
             unrepaired = replace(unrepaired, outliers=outliers, missing=missing, **parts)
-        probability_n = verdict.probability_n.tolist()
-        T_new = poses[verdict.row - 1].T_target_source if verdict.row else T_registered
-        if verdict.rows:
-            poses = [poses[row - 1] for row in verdict.rows]
-        T_repaired = None
         if verdict.row:
-            T_repaired = proposals.T_n[verdict.row]
-            _, (fitness,), (rmse,) = clouds.icp.register(clouds.source, T_repaired[None], max_iterations=0)
+            _, (fitness,), (rmse,) = clouds.icp.register(clouds.source, T_best[None], max_iterations=0)
             unrepaired = replace(unrepaired, fitness=float(fitness), inlier_rmse=float(rmse) * frame.diameter)
+        promised = None if level.repaired_below is None or lost else WRONG
+        return replace(unrepaired, wrong=promised).decided(
+            verdict, poses, proposals.T_n, level.threshold, level.good_below
+        )
+
+    def decided(
+        self, verdict: Verdict, poses: Sequence[OtherPose], T_n: Sequence, failed_from: float, good_below: float
+    ) -> Self:
+        """Add a verdict and its poses; `T_n` are the registered one and these in the target's frame."""
+        T_target_source = poses[verdict.row - 1].T_target_source if verdict.row else self.T_registered
+        poses = [poses[row - 1] for row in verdict.rows] or poses
+        scene = self.scene and replace(
+            self.scene,
+            T_repaired=T_n[verdict.row] if verdict.row else None,
+            T_others=tuple(T_n[row] for row in verdict.rows),
+        )
         return replace(
-            unrepaired,
-            T_target_source=T_new,
+            self,
+            T_target_source=T_target_source,
             verdict=verdict.name,
             action=ACTIONS.get(verdict.name, CHECK),
-            reason=reason_of(verdict, poses, unit),
-            registered_result=probability_n[0],
-            result=probability_n[verdict.row],
-            failed_from=level.threshold,
-            good_below=level.good_below,
-            wrong=None if level.repaired_below is None or lost else WRONG,
+            reason=reason_of(verdict, poses, self.unit),
+            registered_result=float(verdict.probability_n[0]),
+            result=float(verdict.probability_n[verdict.row]),
+            failed_from=failed_from,
+            good_below=good_below,
             poses=tuple(poses),
-            scene=replace(scene, T_repaired=T_repaired, T_others=tuple(proposals.T_n[list(verdict.rows)])),
+            scene=scene,
         )
 
     @property

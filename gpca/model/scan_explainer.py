@@ -81,7 +81,7 @@ def explain_scans(
     """
     started = perf_counter()
     given = source_points, target_points, T_target_source_init, unit, voxel, method, source_unit, limit, T_target_source
-    scans, frame, T_init, outcome, limit, notes = registered_scans(*given)
+    scans, frame, T_init, outcome, name, limit, notes = registered_scans(*given)
     T_found, tolerance = outcome.T_target_source, limit / frame.diameter
     ranked = scans.poses(T_found, min(scans.voxel, tolerance / 2))
     enactments = [scans.enacted(pose, T_found) for pose in ranked]
@@ -110,7 +110,7 @@ def explain_scans(
         T_target_source=frame.pose_outside(T_found) @ T_init,
         fitness=outcome.fitness,
         inlier_rmse=outcome.inlier_rmse * frame.diameter,
-        method=GIVEN if T_target_source is not None else method or scans.icp_name,
+        method=name,
         voxel=scans.voxel * frame.diameter,
         state=state,
         failure=failure,
@@ -142,13 +142,13 @@ def registered_scans(
     target_points: Any,
     T_target_source_init: np.ndarray | None,
     unit: str,
-    voxel: float | None,
-    method: str | None,
-    source_unit: str | None,
-    limit: float | None,
-    T_target_source: np.ndarray | None,
-) -> tuple[Scans, CanonicalFrame, np.ndarray, Outcome, float, list[str]]:
-    """Return the thinned scans, the frame of the target, the initial pose, the registration, its limit, and notes.
+    voxel: float | None = None,
+    method: str | None = None,
+    source_unit: str | None = None,
+    limit: float | None = None,
+    T_target_source: np.ndarray | None = None,
+) -> tuple[Scans, CanonicalFrame, np.ndarray, Outcome, str, float, list[str]]:
+    """Return thinned scans, the target's frame, the initial pose, the registration, its method and limit, and notes.
 
     The arguments are those of :func:`explain_scans`.
     """
@@ -172,7 +172,8 @@ def registered_scans(
         outcome = scans.registered() if method is None else scans.registered_by(method)
     if outcome.failure:
         notes.append(f"{method} failed: {outcome.failure}")
-    return scans, frame, T_init, outcome, limit, notes
+    name = GIVEN if T_given is not None else method or scans.icp_name
+    return scans, frame, T_init, outcome, name, limit, notes
 
 
 def _reenacted(scans: Scans, enactments: Sequence[Enactment], T_found: np.ndarray) -> Reenacted:

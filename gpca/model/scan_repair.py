@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from gpca.model.diagnosis import CHECK
-from gpca.model.explanation import GIVEN, LEARNED
+from gpca.model.diagnosis import CHECK, UNKNOWN
+from gpca.model.explanation import LEARNED
 from gpca.model.repair import verdict_of
-from gpca.model.repaired import ACTIONS, OtherPose, Repair, reason_of
+from gpca.model.repaired import OtherPose, Repair
 from gpca.model.scan_explainer import (
     GOOD,
     LEAST_OVERLAP,
@@ -29,19 +29,16 @@ def repair_scans(
     target_points: Any,
     T_target_source_init: np.ndarray | None = None,
     unit: str = "m",
-    voxel: float | None = None,
-    method: str | None = None,
-    source_unit: str | None = None,
-    limit: float | None = None,
-    T_target_source: np.ndarray | None = None,
+    **options: Any,
 ) -> Repair:
     """Register a scan to a scan and, if the result may be wrong, put it right where another pose is called nominal.
 
-    The arguments are those of :func:`gpca.model.scan_explainer.explain_scans`.
+    The arguments are those of :func:`gpca.model.scan_explainer.explain_scans`, without the estimator.
     """
     started = perf_counter()
-    given = source_points, target_points, T_target_source_init, unit, voxel, method, source_unit, limit, T_target_source
-    scans, frame, T_init, outcome, limit, notes = registered_scans(*given)
+    scans, frame, T_init, outcome, method, limit, notes = registered_scans(
+        source_points, target_points, T_target_source_init, unit, **options
+    )
     T, tolerance = outcome.T_target_source, limit / frame.diameter
     ranked = scans.poses(T, min(scans.voxel, tolerance / 2))
     weight_k, _ = weights_and_errors(scans, ranked, T)
@@ -60,32 +57,21 @@ def repair_scans(
         expected = float((weight_k * weights_and_errors(scans, ranked, pose)[1]).sum())
         more = {"off": float(failed), "differs": None, "differs_by": 0.0}
         poses.append(OtherPose.of(pose, weight, expected, T, scans.coarse, **more).outside(frame, T_init))
-    if verdict.rows:
-        poses = [poses[row - 1] for row in verdict.rows]
-    T_used, T_registered = T_n[verdict.row], frame.pose_outside(T) @ T_init
-    at_pose = scans.outcome(T_used)
-    scene = Scene(scans.source, scans.target, T, frame, SHOWN_REACH * scans.voxel, tolerance)
-    return Repair(
-        T_target_source=poses[verdict.row - 1].T_target_source if verdict.row else T_registered,
+    at_pose, T_registered = scans.outcome(T_n[verdict.row]), frame.pose_outside(T) @ T_init
+    repair = Repair(
+        T_target_source=T_registered,
         T_registered=T_registered,
         fitness=at_pose.fitness,
         inlier_rmse=at_pose.inlier_rmse * frame.diameter,
-        method=GIVEN if T_target_source is not None else method or scans.icp_name,
-        verdict=verdict.name,
-        action=ACTIONS.get(verdict.name, CHECK),
-        reason=reason_of(verdict, poses, unit),
+        method=method,
+        verdict=UNKNOWN,
+        action=CHECK,
+        reason="",
         unit=unit,
         tolerance=limit,
         tolerance_share=tolerance,
-        registered_result=float(failure_n[0]),
-        result=float(failure_n[verdict.row]),
-        failed_from=GOOD,
-        good_below=GOOD,
-        poses=tuple(poses),
         notes=tuple(notes),
         learned_from=LEARNED,
-        seconds=perf_counter() - started,
-        scene=replace(
-            scene, T_repaired=T_used if verdict.row else None, T_others=tuple(T_n[row] for row in verdict.rows)
-        ),
-    )
+        scene=Scene(scans.source, scans.target, T, frame, SHOWN_REACH * scans.voxel, tolerance),
+    ).decided(verdict, poses, T_n, GOOD, GOOD)
+    return replace(repair, seconds=perf_counter() - started)
