@@ -30,7 +30,7 @@ Errors = Callable[[int, np.ndarray], np.ndarray]  # row, poses T_target_source (
 
 @dataclass(frozen=True)
 class Proposed(Container):
-    """The proposals for N registrations, P each: the registered pose, then others under K hypotheses.
+    """The proposals for N registrations, P each: the registered pose, then others under K poses that may be true.
 
     Where a pair has fewer, its first proposal stands in the place of the others, with weight 0.
     """
@@ -38,26 +38,21 @@ class Proposed(Container):
     error_N_P: np.ndarray = array("N P", least=0)  # diameters, capped as those of causes
     weight_N_P: np.ndarray = array("N P", least=0, most=1)
     distance_N_P_K: np.ndarray = array("N P K", least=0)
-    hypothesis_N_K: np.ndarray = array("N K", least=0, most=1)  # probabilities
+    hypothesis_N_P_K: np.ndarray = array("N P K", least=0, most=1)  # probabilities
     inlier_rmse_N_P: np.ndarray = array("N P", least=0)
     fitness_N_P: np.ndarray = array("N P", least=0, most=1)
     family_N: np.ndarray = array("N", TEXT)
 
     def evidence(self, column: int) -> Evidence:
         """What is read of one proposal of each registration."""
-        given = self.distance_N_P_K, self.inlier_rmse_N_P, self.fitness_N_P
-        distance_N_K, rmse_N, fitness_N = (values[:, column] for values in given)
-        return Evidence(distance_N_K, self.hypothesis_N_K, rmse_N, fitness_N)
+        given = self.distance_N_P_K, self.hypothesis_N_P_K, self.inlier_rmse_N_P, self.fitness_N_P
+        return Evidence(*(values[:, column] for values in given))
 
     def at(self, row: int) -> Proposals:
         """Return the proposals for one registration, without their poses."""
         count = self.error_N_P.shape[1]
-        evidence = Evidence(
-            self.distance_N_P_K[row],
-            np.tile(self.hypothesis_N_K[row], (count, 1)),
-            self.inlier_rmse_N_P[row],
-            self.fitness_N_P[row],
-        )
+        given = self.distance_N_P_K, self.hypothesis_N_P_K, self.inlier_rmse_N_P, self.fitness_N_P
+        evidence = Evidence(*(values[row] for values in given))
         return Proposals(np.tile(np.eye(4), (count, 1, 1)), self.weight_N_P[row], evidence)
 
     def judge(self) -> ResultJudge:
@@ -118,12 +113,12 @@ def joined(proposals: Sequence[Proposals], errors: Sequence[np.ndarray], family_
     """Return proposals for N registrations, under as many hypotheses each, with the errors of their poses."""
     columns: list[tuple] = []
     for each, error_n in zip(proposals, errors, strict=True):
-        evidence, count = each.evidence, 1 + each.evidence.weight_N_K.shape[1]
+        evidence, count = each.evidence, each.evidence.weight_N_K.shape[1]  # as many as hypotheses, and one
         row_P = np.where(np.arange(count) < len(error_n), np.arange(count), 1)
         # Sums of probabilities may be rounded up.
         weight_P = np.where(np.arange(count) < len(error_n), each.weight_n[row_P], 0).clip(0, 1)
-        measured_P = evidence.inlier_rmse_N[row_P], evidence.fitness_N[row_P]
-        columns.append((error_n[row_P], weight_P, evidence.distance_N_K[row_P], evidence.weight_N_K[0], *measured_P))
+        given = evidence.distance_N_K, evidence.weight_N_K, evidence.inlier_rmse_N, evidence.fitness_N
+        columns.append((error_n[row_P], weight_P, *(values[row_P] for values in given)))
     error, weight, distance, hypothesis, rmse, fitness = (np.array(column) for column in zip(*columns, strict=True))
     return Proposed(error, weight, distance, hypothesis, rmse, fitness, np.asarray(family_N))
 

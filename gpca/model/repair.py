@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gpca.alignment.batched_icp import BatchedICP
-from gpca.alignment.icp import ICPSettings
+from gpca.alignment.icp import ICPSettings, clipped_cost
 from gpca.alignment.methods.interface import Pair
 from gpca.alignment.methods.registry import make_method
 from gpca.causes.settings import MODEL, Moved
@@ -25,6 +25,7 @@ from gpca.reenactment.hypotheses import (
     SAME,
     distinct_rows,
     find_hypotheses,
+    search_starts,
     weights_of,
 )
 from gpca.reenactment.mixture import Mixture
@@ -34,10 +35,11 @@ from gpca.rigid import inverse, inverses, transform
 from gpca.seeds import generator
 
 GOOD, REPAIRED, NOT_REPAIRED, SEVERAL = VERDICTS = ("good", "repaired", "not repaired", "several poses fit")
-WRONG = 0.05  # largest share of wrong poses among those that are called repaired
 LEAST_WEIGHT = 0.05  # of a pose that is offered beside others
 OF_WIDTH = 0.7  # of the mixture's width: the noise, without the gaps between the target's points
 LARGE = 0.5  # of the largest distance: from this on, a point belongs to the part in which two poses differ
+OF_ESTIMATE = 0.5  # probability of the estimate of the true pose beside the hypotheses
+SWEPT, SWEPT_MODEL, CONTINUED = 64, 128, 6  # points that ICP sees from many starts; ends from which it sees all
 
 Refine = Callable[[np.ndarray, np.ndarray], np.ndarray]  # observed points (N, 3), poses (k, 4, 4) -> where they end
 Measure = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]  # poses (n, 4, 4) -> fitness (n,), inlier RMSE (n,)
@@ -49,7 +51,7 @@ class Proposals:
 
     T_n: np.ndarray  # (n, 4, 4) the registered pose; then hypotheses, refined, each once, the most probable first
     weight_n: np.ndarray  # (n,) probabilities of the hypotheses that end there, 0 for the registered pose
-    evidence: Evidence  # of the n poses, under the hypotheses
+    evidence: Evidence  # of the n poses, as :func:`likely_errors` has it
 
     def set_of(self, rows: list[int]) -> Evidence:
         """Return the evidence of the claim that one of these poses is right, which fits as the first of them does."""
@@ -91,11 +93,36 @@ def propose(
     apart_k_n = np.stack([surface.apart(T_k @ inverse(T_k[row])) for row in rows], axis=1)
     weight_n = np.bincount(apart_k_n.argmin(axis=1), weight_K[possible], minlength=len(rows))
     T_n = np.concatenate([T_registered[None], T_k[rows]])
-    whole = whole_surface(observed, surface, T_K[possible[0]])
-    distance_n_K = np.stack([whole.errors(T @ inverses(T_K)) for T in T_n])
+    distance_n_K, weight_n_K = likely_errors(observed, surface, T_n, T_K, weight_K)
+    weight_n_K[0] = np.append(weight_K, 0.0)  # as any judge of results has it
     fitness_n, rmse_n = measure(T_n)
-    evidence = Evidence(distance_n_K, np.tile(weight_K, (len(T_n), 1)), rmse_n, fitness_n)
-    return Proposals(T_n, np.append(0.0, weight_n), evidence)
+    return Proposals(T_n, np.append(0.0, weight_n), Evidence(distance_n_K, weight_n_K, rmse_n, fitness_n))
+
+
+def likely_errors(
+    observed: np.ndarray, surface: ModelSurface, T_n: np.ndarray, T_K: np.ndarray, weight_K: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return errors (n, K + 1) of poses (n, 4, 4), and how probable each error is.
+
+    A pose that was refined from a hypothesis (K, 4, 4) agrees with it, right or wrong. One more estimate of the true
+    pose, by another criterion, therefore stands beside them.
+    """
+    whole = whole_surface(observed, surface, T_K[int(np.argmax(weight_K))])
+    back_k = inverses(np.concatenate([T_K, best_end(observed, surface)[None]]))
+    weight_k = np.append((1 - OF_ESTIMATE) * weight_K, OF_ESTIMATE)
+    return np.stack([whole.errors(T @ back_k) for T in T_n]), np.tile(weight_k, (len(T_n), 1))
+
+
+def best_end(observed: np.ndarray, surface: ModelSurface) -> np.ndarray:
+    """Return the pose (4, 4) with the least cost at which ICP from many starts ends, on few points and then on all."""
+    points = observed[generator("repair", "starts").permutation(len(observed))[: len(surface.points)]]
+    some, some_model, icp = points[:SWEPT], surface.points[:SWEPT_MODEL], ICPSettings()
+
+    def ends(points: np.ndarray, model: np.ndarray, starts_n: np.ndarray) -> np.ndarray:
+        T_n, fitness_n, rmse_n = BatchedICP(model, icp).register(points, starts_n)
+        return T_n[np.argsort(clipped_cost(fitness_n, rmse_n, icp.correspondence_distance), kind="stable")]
+
+    return ends(points, surface.points, ends(some, some_model, search_starts(some, some_model))[:CONTINUED])[0]
 
 
 def unrefined(observed: np.ndarray, T_k: np.ndarray) -> np.ndarray:

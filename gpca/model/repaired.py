@@ -12,6 +12,7 @@ from gpca.alignment.methods.interface import Outcome, Pair
 from gpca.alignment.methods.registry import method_entry
 from gpca.causes.policy import NOTHING
 from gpca.causes.settings import OBSERVED
+from gpca.guarantee.acceptance import WRONG
 from gpca.model import page
 from gpca.model.clouds import FEWEST_MATCHES, Clouds, voids_of
 from gpca.model.diagnosis import CHECK, TAKE, UNKNOWN, FittingPose
@@ -22,7 +23,6 @@ from gpca.model.repair import (
     NOT_REPAIRED,
     REPAIRED,
     SEVERAL,
-    WRONG,
     Part,
     Proposals,
     Refine,

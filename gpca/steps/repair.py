@@ -30,18 +30,17 @@ from gpca.io.csv_file import ANY, finite_number, numbers, read_csv, write_csv
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.model.proposed import Errors, Proposed, joined, pose_errors, propose_for
-from gpca.model.repair import Proposals, measured, search
+from gpca.model.repair import Proposals, likely_errors, measured, search
 from gpca.objects.canonical import BY_ICP, ObjectClouds
 from gpca.pairs.distances import ObservedPair
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
 from gpca.reenactment.dataset import Reenactments
-from gpca.reenactment.enactment import whole_surface
 from gpca.reenactment.hypotheses import search_starts
 from gpca.reenactment.scans import REACH
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
-from gpca.rigid import exp, inverse, inverses, require_rigid, transform
+from gpca.rigid import exp, inverse, require_rigid, transform
 from gpca.scans.pair import near
 from gpca.seeds import generator, seed_of
 from gpca.settings import Bounds, Count, read_settings
@@ -93,7 +92,7 @@ class Attempts(Container):
     error_N_C: np.ndarray = array("N C", least=0)
     weight_N_C: np.ndarray = array("N C", least=0, most=1)
     distance_N_C_K: np.ndarray = array("N C K", least=0)
-    hypothesis_N_K: np.ndarray = array("N K", least=0, most=1)
+    hypothesis_N_C_K: np.ndarray = array("N C K", least=0, most=1)
     inlier_rmse_N_C: np.ndarray = array("N C", least=0)
     fitness_N_C: np.ndarray = array("N C", least=0, most=1)
     family_N: np.ndarray = array("N", TEXT)
@@ -107,7 +106,7 @@ class Attempts(Container):
             self.error_N_C[:, chosen],
             self.weight_N_C[:, chosen],
             self.distance_N_C_K[:, chosen],
-            self.hypothesis_N_K,
+            self.hypothesis_N_C_K[:, chosen],
             self.inlier_rmse_N_C[:, chosen],
             self.fitness_N_C[:, chosen],
             self.family_N,
@@ -116,12 +115,12 @@ class Attempts(Container):
     @property
     def proposed(self) -> Proposed:
         """The proposals."""
-        return self.columns(0, self.hypothesis_N_K.shape[1] + 1)
+        return self.columns(0, -len(self.method_M))
 
     @property
     def rivals(self) -> Proposed:
         """What the rivals found, a column each."""
-        return self.columns(self.hypothesis_N_K.shape[1] + 1, None)
+        return self.columns(-len(self.method_M), None)
 
 
 def attempt(job: Job) -> None:
@@ -232,20 +231,19 @@ def try_all(
         tried += [rival.by_function(name, function) for name, function in functions.items()]
         T_M = np.array([each.T for each in tried])
         fitness_M, rmse_M = measured(rival.before, pair.model, icp, moved)(T_M)
-        whole = whole_surface(rival.before, surface, T_K[np.argmax(weight_K)])
-        distance_M_K = np.stack([whole.errors(T @ inverses(T_K)) for T in T_M])
+        judged_M = likely_errors(rival.before, surface, T_M, T_K, weight_K)
         score_M_Q = np.array([each.score_Q for each in tried])
-        columns.append((world.errors(row, T_M), distance_M_K, rmse_M, fitness_M, score_M_Q))
+        columns.append((world.errors(row, T_M), *judged_M, rmse_M, fitness_M, score_M_Q))
         spent = {REPAIR: rival.repair_seconds} | {each.name: each.seconds for each in tried}
         seconds += [(int(registrations.sample[row]), *each) for each in spent.items()]
     proposed = joined(proposals, errors, registrations.cluster)
-    error_N_M, distance_N_M_K, rmse_N_M, fitness_N_M, score_N_M_Q = map(np.array, zip(*columns, strict=True))
+    error_N_M, *judged_N_M, rmse_N_M, fitness_N_M, score_N_M_Q = map(np.array, zip(*columns, strict=True))
     attempts = Attempts(
         **world.columns,
         error_N_C=np.hstack([proposed.error_N_P, error_N_M]),
         weight_N_C=np.hstack([proposed.weight_N_P, np.zeros_like(error_N_M)]),
-        distance_N_C_K=np.hstack([proposed.distance_N_P_K, distance_N_M_K]),
-        hypothesis_N_K=proposed.hypothesis_N_K,
+        distance_N_C_K=np.hstack([proposed.distance_N_P_K, judged_N_M[0]]),
+        hypothesis_N_C_K=np.hstack([proposed.hypothesis_N_P_K, judged_N_M[1]]),
         inlier_rmse_N_C=np.hstack([proposed.inlier_rmse_N_P, rmse_N_M]),
         fitness_N_C=np.hstack([proposed.fitness_N_P, fitness_N_M]),
         family_N=registrations.cluster,

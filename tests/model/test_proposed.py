@@ -19,9 +19,9 @@ def proposed(random, families, each=20):
     fitness_N_P = np.where(error_N_P > TOLERANCE, 0.5, 0.9) + random.normal(0, 0.1, (count, 3))
     weight_N_P = np.tile([0.0, 0.7, 0.3], (count, 1))
     family_N = np.array([f"family {number}" for number in np.repeat(np.arange(families), each)])
-    hypothesis_N_K, rmse_N_P = np.tile([0.7, 0.3], (count, 1)), distance_N_P_K[..., 0]
+    hypothesis_N_P_K, rmse_N_P = np.tile([0.7, 0.3], (count, 3, 1)), distance_N_P_K[..., 0]
     measured = rmse_N_P, fitness_N_P.clip(0, 1)
-    return Proposed(error_N_P, weight_N_P, distance_N_P_K, hypothesis_N_K, *measured, family_N)
+    return Proposed(error_N_P, weight_N_P, distance_N_P_K, hypothesis_N_P_K, *measured, family_N)
 
 
 def test_few_of_the_poses_that_are_called_repaired_are_wrong():
@@ -46,7 +46,8 @@ def test_too_few_registrations_promise_nothing():
 
 def test_the_first_proposal_fills_up_where_there_are_fewer():
     def of(count):
-        evidence = Evidence(np.full((count, 2), 0.1), np.tile([0.6, 0.4], (count, 1)), np.arange(count), np.ones(count))
+        weight_K = np.tile([0.3, 0.2, 0.5], (count, 1))  # of two hypotheses and another estimate
+        evidence = Evidence(np.full((count, 3), 0.1), weight_K, np.arange(count), np.ones(count))
         return Proposals(np.tile(np.eye(4), (count, 1, 1)), np.array([0.0, 0.6, 0.4])[:count], evidence)
 
     both = joined([of(3), of(2)], [np.array([0.2, 0.01, 0.3]), np.array([0.2, 0.01])], np.array(["a", "b"]))

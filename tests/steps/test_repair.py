@@ -67,7 +67,7 @@ def drawn(seed, families=14, each=24):
         error_N_C=error_N_C,
         weight_N_C=np.tile([0, 0.7, 0.3, 0, 0], (count, 1)),
         distance_N_C_K=distance_N_C_K,
-        hypothesis_N_K=np.tile([0.7, 0.3], (count, 1)),
+        hypothesis_N_C_K=np.tile([0.7, 0.3], (count, 5, 1)),
         inlier_rmse_N_C=np.full((count, 5), 0.02),
         fitness_N_C=np.full((count, 5), 0.9),
         family_N=np.repeat([f"family {number}" for number in range(families)], each),
