@@ -170,7 +170,7 @@ class Repair(ExplainedRegistration):
             unrepaired = replace(unrepaired, fitness=float(fitness), inlier_rmse=float(rmse) * frame.diameter)
         promised = None if level.repaired_below is None or lost else WRONG
         return replace(unrepaired, wrong=promised).decided(
-            verdict, poses, proposals.T_n, level.threshold, level.good_below
+            verdict, poses, list(proposals.T_n), level.threshold, level.good_below
         )
 
     def decided(
