@@ -4,8 +4,6 @@ Every loop that stands with its types is compiled by numba for the common level 
 that numba would run becomes position-independent code, which a C compiler links. Every build has the same bytes.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

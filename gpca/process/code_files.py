@@ -1,7 +1,5 @@
 """The source files that a step depends on, as inputs of its rule: Snakemake does not track imported modules."""
 
-from __future__ import annotations
-
 import ast
 from functools import cache
 from pathlib import Path

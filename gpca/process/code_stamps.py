@@ -1,7 +1,5 @@
 """One file by which the jobs of a rule depend on code, as Snakemake looks at every input of every job."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 from functools import cache

@@ -4,11 +4,8 @@
 code, and is used where its sources are those of this package and the processor has its instructions.
 """
 
-from __future__ import annotations
-
 import ctypes
 import hashlib
-import os
 import sys
 from collections.abc import Callable
 from functools import cache, cached_property, update_wrapper
@@ -18,7 +15,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from gpca.process.processor import may_pin
+from gpca.process.processor import has_threads, may_pin
 
 NOTICE = "compiling loops, which takes up to half a minute; later calls load what is kept of them"
 REMEDY = "; 'python -m gpca.process.build_loops' compiles most of them once and for all"
@@ -98,11 +95,6 @@ def njit(ahead: str = "", **options: Any) -> Callable[[Callable[..., Any]], Loop
         options: of numba.
     """
     return lambda function: Loop(function, ahead, options)
-
-
-def has_threads() -> bool:
-    """Return whether loops of this process are shared out to threads."""
-    return os.environ.get("NUMBA_NUM_THREADS", "1") != "1"
 
 
 def _unfold(argument: Any, numbers: list[Any]) -> str:

@@ -19,7 +19,7 @@ from numba.core.event import Listener, register
 from numba.extending import typeof_impl
 
 from gpca.process.code_files import ROOT, code_files
-from gpca.process.compilation import has_threads
+from gpca.process.processor import has_threads
 
 __all__ = ["Compilations", "njit", "prange", "register", "typeof_impl", "types"]
 

@@ -9,8 +9,6 @@ announces it by an entry point in the group of its entries::
 The plugins of a config reach the jobs of a run by an environment variable.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -7,8 +7,6 @@ vendor; `gpca.portable` replaces those functions, and ``tests/vendor_guard.py`` 
 have no effect on Open3D, small_gicp and other libraries compiled for one level, or on plugins.
 """
 
-from __future__ import annotations
-
 import os
 import platform
 from collections.abc import Mapping
@@ -49,6 +47,11 @@ def pin_instructions() -> str:
         return "native"
     os.environ.update(_PINS)
     return COMMON_LEVEL
+
+
+def has_threads() -> bool:
+    """Return whether loops of this process are shared out to threads."""
+    return os.environ.get("NUMBA_NUM_THREADS", "1") != "1"
 
 
 def may_pin() -> bool:

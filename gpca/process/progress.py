@@ -4,8 +4,6 @@ Inside a callback of compiled code, a ``__del__`` or a weakref callback, Python 
 on, and numba raises a SystemError instead. So the signal is also remembered, and raised again by :func:`progress`.
 """
 
-from __future__ import annotations
-
 import signal
 import sys
 from collections.abc import Iterable, Iterator

@@ -1,7 +1,5 @@
 """Registries: entries by name that the modules of a folder list; and functions by ``module:name``."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass

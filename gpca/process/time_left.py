@@ -4,8 +4,6 @@ The expected time of a job is that of its benchmark file from an earlier run in 
 rule in a measured run (`TIMES`), else the mean of all other jobs.
 """
 
-from __future__ import annotations
-
 import csv
 import logging
 from collections.abc import Callable, Mapping
