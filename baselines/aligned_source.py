@@ -3,8 +3,6 @@
 The same explainers name causes, with "nominal" as a further class.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

@@ -4,8 +4,6 @@ Here a cropped cloud has fewer points than the others, so the point-count ratio 
 with a sensor. Hence two rows: `analytical_gpc` with the paper's list, `analytical_gpc_no_counts` without the ratio.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Annotated
 

@@ -12,8 +12,6 @@ Forssén & Edstedt 2025): local features of both aligned clouds, their distances
 trees replace its network. ``reenact`` and ``reenact_committee`` read a re-enactment of the pair (docs/reenactment.md).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

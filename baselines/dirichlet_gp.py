@@ -4,8 +4,6 @@ A label becomes a Dirichlet distribution with α = α_ε + 1{y = c}, approximate
 known noise. One exact GP per concept is fitted by its marginal likelihood; probabilities are the softmax of its draws.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from gpca.classifier.scores import summarize_marginals

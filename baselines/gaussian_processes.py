@@ -1,7 +1,5 @@
 """GP-CA on the embedding of the aligned source, by other code and for other labels."""
 
-from __future__ import annotations
-
 from gpca.classifier.settings import GPCArguments
 from gpca.explainers.gpca import GPCA
 from gpca.explainers.interface import ExplainerEntry, for_causes

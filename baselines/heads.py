@@ -5,8 +5,6 @@ scores, variances and BALD like GP-CA's: members of a deep ensemble (Lakshminara
 Monte-Carlo dropout (Gal & Ghahramani 2016), or Laplace's approximation over the last layer (Daxberger et al. 2021).
 """
 
-from __future__ import annotations
-
 import math
 from functools import partial
 from itertools import pairwise

@@ -3,8 +3,6 @@
 The forest and the linear SVM are the paper's: scikit-learn's defaults, 50 trees, random_state 42.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

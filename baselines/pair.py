@@ -5,8 +5,6 @@
 pose errors away in the paper's protocol. `pair_forest` is the plainest form of the same idea; `density` is a control.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

@@ -4,8 +4,6 @@ Noise raises the forward residual (source to target), a missing part the backwar
 pose both, and the spread of the Monte-Carlo poses of ICP. Like GP-CA, the classifiers learn from the training labels.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Annotated
 

@@ -5,8 +5,6 @@ cited by the paper) and total indices by Saltelli's scheme (Saltelli et al. 2010
 on one at a time (docs/baselines.md).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

@@ -6,8 +6,6 @@ features present; the concept with the largest Shapley value is named. The proto
 (oracle), or a remedy applied to the observed pair (removal; supervised: with labels).
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

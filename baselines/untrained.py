@@ -4,8 +4,6 @@ A method's gain is its lead over the best of these. The rule uses the paper's pr
 from the truth, and only overlap samples have fewer points. Its accuracy is what the protocol itself gives away.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -4,8 +4,6 @@ Values of knobs are used directly. A remedy may lower the uncertainty of every p
 values are standardized over the training split; with labels a classifier reads them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Literal, get_args

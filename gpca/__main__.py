@@ -1,7 +1,5 @@
 """The command ``gpca <command> …``, or ``python -m gpca <command> …``: the commands that people run by hand."""
 
-from __future__ import annotations
-
 import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable

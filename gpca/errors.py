@@ -1,7 +1,5 @@
 """The exception for a user's mistake, which is shown as one line instead of a traceback."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager

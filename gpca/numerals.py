@@ -4,8 +4,6 @@ Python's int() and float() also accept digits of other scripts, underscores, NaN
 they take minutes; all of these are typos or damage in a file.
 """
 
-from __future__ import annotations
-
 import math
 import re
 

@@ -4,8 +4,6 @@ For its own functions torch calls MKL, which starts some of them with an estimat
 of each vendor; ``tests/vendor_guard.py`` lists these functions.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 

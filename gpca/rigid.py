@@ -1,7 +1,5 @@
 """Rigid transforms as 4×4 matrices such as ``T_target_source``, their twists (rotation, translation), least squares."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -1,7 +1,5 @@
 """Random generators from named axes, so that no draw depends on call order, thread count or sample count."""
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 

@@ -4,8 +4,6 @@ A strategy gets the pool, the batch size B and a random generator, and returns r
 margin, BADGE, CoreSet and TypiClust are scikit-activeml's; BALD uses the GP's posterior instead of an ensemble.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Labeling by a person: queued registrations, the file of labels, and the session that asks and retrains."""
 
-from __future__ import annotations
-
 import csv
 import re
 import zipfile

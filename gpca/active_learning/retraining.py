@@ -3,8 +3,6 @@
 In :mod:`gpca.active_learning.rounds`, labels only update the posterior, which takes a hundredth of the time.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 

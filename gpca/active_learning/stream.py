@@ -5,8 +5,6 @@ threshold and the budget allows, it asks for the label and learns it. The learne
 (2025), which the paper cites, use the same embeddings, initial samples and budget.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from copy import copy
 

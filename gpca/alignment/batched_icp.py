@@ -5,8 +5,6 @@ Point-to-point runs are a compiled loop with Open3D's steps and stopping rule, w
 every point in every iteration. :class:`BatchedPlaneICP` takes all point-to-plane runs one step at a time.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 

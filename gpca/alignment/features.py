@@ -1,7 +1,5 @@
 """Normals and fast point feature histograms (FPFH, Rusu et al. 2009) of points, by their neighbors."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

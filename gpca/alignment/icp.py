@@ -1,7 +1,5 @@
 """Point cloud registration by ICP (Besl & McKay 1992; Chen & Medioni 1992; Segal et al. 2009) through Open3D."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, get_args
 

@@ -1,7 +1,5 @@
 """Errors of poses, ADD, and ADD-S for symmetric objects (Hinterstoisser et al. 2012), and when they are a success."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ Of S test samples: ``wrong_S`` whether each was named wrongly, ``confidence_S`` 
 explainer is surer, ``p_S_C`` class probabilities and ``target_S`` the numbers of the true classes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

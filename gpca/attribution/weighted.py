@@ -1,7 +1,5 @@
 """The diagnostics of :mod:`gpca.attribution.diagnostics` for B draws, in which samples stand ``weights_B_S`` times."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from gpca.attribution.diagnostics import BINS

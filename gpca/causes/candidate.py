@@ -6,8 +6,6 @@ where the registration starts. ICP aligns the model to the observed cloud, so th
 reverse.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from time import perf_counter

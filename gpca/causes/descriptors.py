@@ -5,8 +5,6 @@ ICP starts from farther off and the best result counts, or the observed cloud is
 partners everywhere. The result with all remedies stands for the unknown truth.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from time import perf_counter

@@ -1,7 +1,5 @@
 """Draws the registrations of one source and seed by rejection, so that every state and cause has its share."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict, replace

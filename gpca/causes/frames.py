@@ -6,8 +6,6 @@ like those measured where noise is; a pose error, by a start from the true pose.
 at the pose that ICP starts from: the side that an object hides by itself counts as no cause.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -4,8 +4,6 @@ Both start at the same place and draw the same random numbers in the same order,
 (docs/baselines.md, ``tests/classifier/test_gpytorch_classes.py``).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 

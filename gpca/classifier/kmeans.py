@@ -1,7 +1,5 @@
 """k-means to the bits of scikit-learn's in one thread, which takes two seconds to import."""
 
-from __future__ import annotations
-
 from math import sqrt
 
 import numpy as np

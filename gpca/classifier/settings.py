@@ -1,7 +1,5 @@
 """Settings of the Gaussian process classifier, without loading torch."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 

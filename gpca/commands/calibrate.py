@@ -1,7 +1,5 @@
 """Command ``calibrate``: a model whose alarm and sets keep their promises on a user's own registrations."""
 
-from __future__ import annotations
-
 import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from dataclasses import replace

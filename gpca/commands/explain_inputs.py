@@ -1,7 +1,5 @@
 """What ``explain`` reads: sources and a target of the command line, or a CSV of pairs."""
 
-from __future__ import annotations
-
 import csv
 from argparse import Namespace
 from collections.abc import Callable, Sequence

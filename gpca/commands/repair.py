@@ -1,7 +1,5 @@
 """Command ``repair``: puts a user's wrong registrations right, on stdout."""
 
-from __future__ import annotations
-
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 

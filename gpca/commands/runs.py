@@ -1,7 +1,5 @@
 """Commands for configs and finished runs: ``check-config``, ``check-reference`` and ``compare``."""
 
-from __future__ import annotations
-
 import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Command ``ship``: the model of the package and its card, from the files of a run; for releases."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

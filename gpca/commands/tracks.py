@@ -1,7 +1,5 @@
 """Commands for the tracks: ``bench``, ``score``, ``leaderboard`` and ``ship-predictions``."""
 
-from __future__ import annotations
-
 import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """The numbers that the paper prints (``published.csv``) and the reasons of misses (``reasons.csv``)."""
 
-from __future__ import annotations
-
 import csv
 import math
 from collections.abc import Iterable, Sequence

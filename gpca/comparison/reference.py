@@ -5,8 +5,6 @@ otherwise. If two runs differ on a sample with probability d, the difference of 
 deviation √(d / n), which bounds the allowed difference (docs/comparison.md).
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter, defaultdict
 from collections.abc import Mapping

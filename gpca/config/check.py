@@ -1,7 +1,5 @@
 """Checks the configuration of a run when the workflow loads, so that a mistake stops it with one line."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import partial
 from typing import Any

@@ -4,8 +4,6 @@ Snakemake's lock outlives a killed process, and every later start ends with a Lo
 each Snakemake also holds a kernel lock, which ends with the process.
 """
 
-from __future__ import annotations
-
 import fcntl
 import json
 import os

@@ -3,8 +3,6 @@
 A merged config can add to mappings but take nothing away, hence the ``false``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterable, Mapping
 from copy import deepcopy
 from dataclasses import fields

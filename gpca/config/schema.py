@@ -1,7 +1,5 @@
 """The whole config as one settings class: shared sections, and those of each experiment."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, make_dataclass
 from functools import cache
 from typing import Annotated, Literal

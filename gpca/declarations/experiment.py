@@ -4,8 +4,6 @@ It stands as ``EXPERIMENT`` in ``gpca/experiments/{name}.py``, which imports not
 tables and figures.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any

@@ -4,8 +4,6 @@ A table that is given a run records which keys of the config it read. As long as
 made again, whatever else in the config changes.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property

@@ -1,7 +1,5 @@
 """All experiments, their steps, tables and figures: a new file of ``gpca/experiments/`` is found at the next call."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from importlib import import_module

@@ -12,8 +12,6 @@ A name in braces stands for all its values (:func:`gpca.experiments.run.names_of
 its names is empty. Functions must be importable without heavy packages.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from inspect import cleandoc
 from pathlib import Path

@@ -5,8 +5,6 @@ values in one job, which is given them as a list under the plural of the name; a
 ``{frames}``, is replaced by it. Values are those of :func:`gpca.experiments.run.names_of`.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -12,8 +12,6 @@ In training, μ and σ² are taken over all B·N·k edges, as in a per-edge laye
 Outputs, running statistics and gradients agree with the per-edge form in ``tests/encoders/per_edge.py``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

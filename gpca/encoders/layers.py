@@ -4,8 +4,6 @@ NumPy's OpenBLAS with pinned instructions (:mod:`gpca.process.processor`) gives 
 speed of torch's MKL, whose vendor-independent code takes twice the time.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

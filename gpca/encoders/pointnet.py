@@ -4,8 +4,6 @@ All embed clouds (B, N, 3) in the target's frame, in diameters, to (B, d). Witho
 turns the cloud, which would erase the concepts. `width` is that of the first layer; all others grow with it.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import torch

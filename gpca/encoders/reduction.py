@@ -4,8 +4,6 @@ Each is fitted on the standardized training embeddings and is then a fixed funct
 matter. A new one is a class here and a line in `REDUCTIONS`.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Backbones by name, their options, and the settings of an encoder and its training; nothing here loads torch."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal

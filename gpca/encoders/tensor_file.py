@@ -3,8 +3,6 @@
 torch checks no checksum, so it loads a file with a flipped bit.
 """
 
-from __future__ import annotations
-
 import zipfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path

@@ -4,8 +4,6 @@ Each epoch draws new points from every cloud. There is no other augmentation: ro
 concept, jitter the noise concept, crops the overlap concept.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections import OrderedDict
 from collections.abc import Callable, Mapping

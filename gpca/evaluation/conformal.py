@@ -4,8 +4,6 @@ No distribution is assumed. Samples have to be exchangeable with a new one: eith
 of similar shapes, where the new sample belongs to a new family.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, inf

@@ -1,7 +1,5 @@
 """Labels that a classifier needs for a concept that it has never seen, by every strategy (Table III)."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any

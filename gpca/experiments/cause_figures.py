@@ -1,7 +1,5 @@
 """Figures of single failures: with the eight counterfactuals and all scores, and as an observer re-enacts them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 

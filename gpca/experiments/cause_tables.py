@@ -1,7 +1,5 @@
 """Tables IX and their figures: whether explainers say that a registration failed, and why, by the measured truth."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from math import inf

@@ -1,7 +1,5 @@
 """Sentences of the paper, tested by the differences in a run."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """How often each explainer names the concept that was perturbed, and at what cost (Tables I and II)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import permutations

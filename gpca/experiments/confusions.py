@@ -1,7 +1,5 @@
 """Confusion matrices of a few explainers in one row, pooled over sources and seeds."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Table X: accuracy under the controls, from each source to each other, with encoders trained otherwise, and costs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from math import inf

@@ -1,7 +1,5 @@
 """Explanations with a shortcut closed: clouds of one density, unseen objects, wrong labels and others (Table X)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any

@@ -1,7 +1,5 @@
 """Causes of failed registrations: explainers against the measured shares of each cause in the error (Table IX)."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass

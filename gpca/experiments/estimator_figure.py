@@ -1,7 +1,5 @@
 """Estimates of the same poses: errors over predicted spreads, and coverages."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

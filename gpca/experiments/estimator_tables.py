@@ -1,7 +1,5 @@
 """Tables of the estimators of a pose's covariance: by what they model, by every reference, as alarms (Table XII)."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import product
 from math import inf

@@ -1,7 +1,5 @@
 """Estimators of a pose's covariance against further registrations and against the error (Table XII)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any

@@ -1,7 +1,5 @@
 """The explainers of an experiment: those of its section of the config, with settings beyond those of ``explainers``."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Accuracies on depth frames by seed and with intervals over scenes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

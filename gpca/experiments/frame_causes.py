@@ -1,7 +1,5 @@
 """Causes of failed registrations of depth frames, where nothing was perturbed: part of Table IX."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import replace

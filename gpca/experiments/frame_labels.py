@@ -1,7 +1,5 @@
 """Labels that a classifier needs for a new concept on depth frames (Sec. IV-E); their numbers join those of frames."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 

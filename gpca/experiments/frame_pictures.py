@@ -1,7 +1,5 @@
 """Pictures of depth frames: a frame explained (Fig. 5), confusions, and the most confident mistakes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Tables of depth frames: Table VI, by backbone and reduction, and by seen and unseen objects."""
 
-from __future__ import annotations
-
 from math import inf
 from typing import Any
 

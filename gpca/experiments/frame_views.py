@@ -1,7 +1,5 @@
 """Bars of concept scores, which several figures show beside a sample."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

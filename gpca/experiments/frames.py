@@ -1,7 +1,5 @@
 """What experiments on depth frames share: titles of the frames and of encoders, and the rows of their tables."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

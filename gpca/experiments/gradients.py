@@ -1,7 +1,5 @@
 """Gradients of GP-CA's scores: points deleted by their saliency, and TCAV."""
 
-from __future__ import annotations
-
 from gpca.declarations.experiment import Experiment, LeftOut
 from gpca.declarations.plan import Run
 from gpca.declarations.result import Frame, Paths, numbers, table

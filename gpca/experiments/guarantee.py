@@ -1,7 +1,5 @@
 """Guarantees for statements about causes: nominal and measured errors of sets of states and an alarm (Table XIX)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product

@@ -1,7 +1,5 @@
 """One joint reading of all that the paper leaves open: what one consistent protocol reproduces (Table XVI)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The classifier's kernel, learning rate and number of iterations (Table IV)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf

@@ -1,7 +1,5 @@
 """Learning curves: accuracy over labels as lines of panels, and numbers of labels as cells of tables."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping
 from math import inf
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Diagnosis of causes by the number of training samples: an estimate of what an observer can reach."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

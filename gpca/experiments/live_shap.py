@@ -1,7 +1,5 @@
 """SHAP by a live function: whether a table of outcomes, computed beforehand, gives the values that shap finds."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf

@@ -1,7 +1,5 @@
 """The method in figures: overview, concepts and objects (Figures 2 and 3); the pipeline stands apart (Figure 4)."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

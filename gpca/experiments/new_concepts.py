@@ -1,7 +1,5 @@
 """Labels that a classifier needs for a concept that no encoder has seen, of samples that none has seen (Table XV)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from itertools import product
 from typing import Any

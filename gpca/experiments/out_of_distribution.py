@@ -1,7 +1,5 @@
 """Classifiers on samples unlike those of the training, and how useful their uncertainty is (Table V)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from functools import partial
 from math import inf

@@ -1,7 +1,5 @@
 """Figure 4: online inference (top) and one round of active learning (bottom), from the files of a run."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

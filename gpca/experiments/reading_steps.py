@@ -1,7 +1,5 @@
 """Steps of the readings: what a group reads, encoders that learn from other severities or see other clouds."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Readings in words: the values of each group's choices, as :class:`gpca.comparison.readings.Words` wants them."""
 
-from __future__ import annotations
-
 from gpca.steps.readings.groups import GROUPS
 
 WORDS = {  # field of a group's choices -> what its values are called

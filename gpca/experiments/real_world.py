@@ -1,7 +1,5 @@
 """GP-CA on objects in depth frames: every backbone with every reduction, and real initial poses (Table VI)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal

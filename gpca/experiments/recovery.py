@@ -1,7 +1,5 @@
 """Policies of recovery from failed registrations, in a closed loop on tables of a virtual camera (Table VIII)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf

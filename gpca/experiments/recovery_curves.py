@@ -1,7 +1,5 @@
 """Figures of recovery: rates by policy, what the allowed error and the costs decide, and labels of queued cases."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from math import nan
 from typing import Any

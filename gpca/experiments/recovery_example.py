@@ -1,7 +1,5 @@
 """Figures 1 and 6 of the paper: one failure of the run and its recovery, and the policy from scores to actions."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from pathlib import Path

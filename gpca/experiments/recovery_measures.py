@@ -1,7 +1,5 @@
 """Measures of policies of recovery: by seed, over all seeds with intervals, and their paired differences."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Re-enactments: one of them as a figure, and what each part of the truth would add to them (docs/reenactment.md)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import inf
 from typing import Any

@@ -1,7 +1,5 @@
 """Registration methods on the same pairs, each from the initial pose and from that of a global method (Table XI)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """Repair: another pose in the place of a wrong one, and rivals that register again (Table XX)."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import inf

@@ -1,7 +1,5 @@
 """The names in the paths of a run, worked out from its configuration."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

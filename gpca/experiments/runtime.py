@@ -1,7 +1,5 @@
 """Seconds of every stage of an explanation (Table VII)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from math import inf, nan

@@ -1,7 +1,5 @@
 """Diagnoses of parts of the test samples: by margin, number of causes, symmetry, error, state and what is shown."""
 
-from __future__ import annotations
-
 from math import inf
 
 import numpy as np

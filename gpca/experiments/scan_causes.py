@@ -3,8 +3,6 @@
 The tables and the figure stand in :mod:`gpca.experiments.scan_failures`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product

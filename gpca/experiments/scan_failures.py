@@ -1,7 +1,5 @@
 """Tables and the figure of the causes on scans: who detects failed registrations, names their causes, and counts."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from math import isfinite, nan
 

@@ -1,7 +1,5 @@
 """Registration methods on pairs of scans, by how much these overlap and where local methods start (Table XVII)."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field

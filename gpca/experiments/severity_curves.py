@@ -1,7 +1,5 @@
 """Accuracy of the explainers and success of the registrations by the severity of the perturbations (Table X)."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from textwrap import wrap
 

@@ -1,7 +1,5 @@
 """Explanations with other registration methods, and other estimators of uncertainty, than the paper's (Table XIV)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any

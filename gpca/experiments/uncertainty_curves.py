@@ -1,7 +1,5 @@
 """How useful the uncertainty of learners is: risk over coverage, reliability, uncertainty over distance (Table V)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

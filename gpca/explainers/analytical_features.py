@@ -3,8 +3,6 @@
 The paper only names "RMSE, normal consistency, planarity, linearity, and point-count ratios"; the formulas are ours.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from gpca.pairs.dataset import Registrations

@@ -1,7 +1,5 @@
 """Gaussian Process Concept Attribution, the paper's method, as an explainer."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from gpca.classifier.settings import GPCArguments

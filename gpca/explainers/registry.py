@@ -3,8 +3,6 @@
 A file lists its explainers of concepts as ``EXPLAINERS`` and those of causes as ``CAUSE_EXPLAINERS``, separately named.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial

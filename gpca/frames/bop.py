@@ -5,8 +5,6 @@ files and meters here; cameras look along +z with x to the right and y down. A v
 named ``obj_000014_48_1002`` by its object, the scene, and the image with the number of the annotation.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass

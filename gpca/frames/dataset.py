@@ -1,7 +1,5 @@
 """Datasets of depth frames: their frames, the models of their objects, and the meshes to render."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Instances: objects in single depth frames with their true and initial poses, and how they are read from datasets."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Checks that refuse data, with the likeliest reason, where objects were not measured where they are annotated."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """What depth cameras measure of one object: sightings in frames, clean views, a robot's shots, the next viewpoint."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product

@@ -1,7 +1,5 @@
 """Situations: an object in a scene of the virtual camera whose registration is disturbed by one known cause."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property

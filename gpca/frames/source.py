@@ -1,7 +1,5 @@
 """Configured datasets of frames: in a local folder, or at the addresses that they are downloaded from."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

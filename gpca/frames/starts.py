@@ -8,8 +8,6 @@ Each kind is a condition of its own, since errors of one kind say little about t
 - ladder: the truth with an error of a fixed size in a random direction, one start for each rung.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 A file may come from anywhere: reading it executes no code, and it holds only plausible numbers.
 """
 
-from __future__ import annotations
-
 import json
 import zipfile
 from collections.abc import Callable, Iterator, Mapping

@@ -1,7 +1,5 @@
 """Arrays in npz files: without pickles, of a known source and seed, and no more than the memory can hold."""
 
-from __future__ import annotations
-
 import io
 import math
 import zipfile

@@ -1,7 +1,5 @@
 """Options of a command line: a parser with one-line errors, and types of numbers."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable
 from typing import NoReturn

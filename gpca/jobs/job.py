@@ -1,7 +1,5 @@
 """A job of the workflow: what its rule gives a step or a script, how it runs, prints and ends."""
 
-from __future__ import annotations
-
 import ctypes
 import json
 import os

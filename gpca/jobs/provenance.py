@@ -1,7 +1,5 @@
 """The provenance of results: a JSON file beside every output."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """Draws one explanation in one look: both clouds, the causes, what would have been without them, and what to do."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from textwrap import fill, wrap
 

@@ -1,7 +1,5 @@
 """The path of the model to use; no model is opened, so no heavy library is loaded."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

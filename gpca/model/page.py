@@ -3,8 +3,6 @@
 Everywhere, `explained` is :meth:`gpca.model.explanation.Explanation.as_dict`.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from html import escape

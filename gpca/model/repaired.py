@@ -169,9 +169,8 @@ class Repair(ExplainedRegistration):
             _, (fitness,), (rmse,) = clouds.icp.register(clouds.source, T_best[None], max_iterations=0)
             unrepaired = replace(unrepaired, fitness=float(fitness), inlier_rmse=float(rmse) * frame.diameter)
         promised = None if level.repaired_below is None or lost else WRONG
-        return replace(unrepaired, wrong=promised).decided(
-            verdict, poses, list(proposals.T_n), level.threshold, level.good_below
-        )
+        repaired = replace(unrepaired, wrong=promised)
+        return repaired.decided(verdict, poses, list(proposals.T_n), level.threshold, level.good_below)
 
     def decided(
         self, verdict: Verdict, poses: Sequence[OtherPose], T_n: Sequence, failed_from: float, good_below: float

@@ -6,8 +6,6 @@ of the poses that are farther from the result than the limit. The second is the 
 two samples of one surface, one point per voxel, lie about 0.6 voxels apart; surfaces that only cross, about 1.1.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from time import perf_counter

@@ -1,7 +1,5 @@
 """Registration of two scans, one point per voxel, and other poses that may fit them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property

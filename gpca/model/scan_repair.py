@@ -1,7 +1,5 @@
 """Puts the registration of two scans right, in the words of objects, and promises nothing."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from time import perf_counter
 from typing import Any

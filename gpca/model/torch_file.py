@@ -1,7 +1,5 @@
 """Model files of version 4, which torch wrote, read as arrays without torch and without executing code."""
 
-from __future__ import annotations
-
 import pickle
 import zipfile
 from collections import OrderedDict

@@ -3,8 +3,6 @@
 Format: https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_format.md. Symmetries are read from
 models_info.json, or else sought on the cloud."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence

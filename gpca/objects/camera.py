@@ -1,7 +1,5 @@
 """A virtual RGB-D camera: ray casting, shading, noise of a structured-light sensor; and views of meshes as a source."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path

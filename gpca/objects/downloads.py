@@ -1,7 +1,5 @@
 """Downloads kept in a cache and checked by SHA-256, and archives (zip, tar, tgz) unpacked without trusting them."""
 
-from __future__ import annotations
-
 import gzip
 import math
 import re

@@ -1,7 +1,5 @@
 """A source's entry in the config (docs/adding.md), and how titles show it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import PurePath

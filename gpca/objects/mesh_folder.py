@@ -1,7 +1,5 @@
 """Meshes and clouds in a folder: PLY, OBJ, STL, OFF, VTK, glb; one file is one object."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path

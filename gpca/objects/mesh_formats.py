@@ -4,8 +4,6 @@ Rows that are too wide, lists of another length, misspelled keywords and an earl
 those of trimesh, in its order, without its import, which takes longer than an explanation.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator
 from operator import itemgetter

@@ -9,8 +9,6 @@ As a kind of source, the UW RGB-D Object Dataset (Lai, Bo, Ren, Fox, ICRA 2011):
 files or in the dataset's tars, named <class>_<instance>_<sequence>_<frame>; in meters, in the camera's frame.
 """
 
-from __future__ import annotations
-
 import io
 import re
 import struct

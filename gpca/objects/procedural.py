@@ -4,8 +4,6 @@ Each is a few solids in millimeters, z up, stretched to the extents of the objec
 models_info.json for LINEMOD (x to the front), and those of the published google_16k scans for YCB.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple

@@ -3,8 +3,6 @@
 VTK has versions 1 to 5; what follows the geometry is not read. Each mesh of glTF stands where the nodes put it.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import struct

@@ -1,7 +1,5 @@
 """Sizes of objects and units of length: which ones are plausible, and what the user is advised."""
 
-from __future__ import annotations
-
 from itertools import product
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ A kind of source is a module with ``from_entry(entry, folder) -> Iterator[Surfac
 folder)`` it can refuse an entry when a workflow loads. Plugins list kinds in ``SOURCES``, each with its module.
 """
 
-from __future__ import annotations
-
 import errno
 import os
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Surfaces, as every kind of source yields them; names of views; clouds that a caller of Python gives."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass

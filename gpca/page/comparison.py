@@ -1,7 +1,5 @@
 """The comparison with the paper for the page: numbers with the digits that the paper prints, verdicts with a tone."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Describes a run as an RO-Crate 1.1 (process run profile): every result with the job that made it and its inputs."""
 
-from __future__ import annotations
-
 import json
 import mimetypes
 from collections import defaultdict

@@ -1,7 +1,5 @@
 """The registrations that the page shows in 3-D: with GP-CA's predictions, and with measured causes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Errors of an object's pose: ADD or ADD-S, the angle up to the symmetries, the shift of its center."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from gpca.alignment.pose_error import JUDGED_POINTS, PoseErrors

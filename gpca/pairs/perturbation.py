@@ -4,8 +4,6 @@ A perturbation makes the observed **source** cloud from clean points of the obje
 diameter. Severities are drawn uniformly from the ranges of :class:`Severities`, the same for every source.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from typing import Annotated, Literal, get_args

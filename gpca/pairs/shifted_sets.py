@@ -4,8 +4,6 @@ Two encoders, each with training samples of its own: the source's encoder, and o
 Learners fitted to the training samples of an encoder explain the test samples of its sets.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The explainers that policies read. They learn from other scenes, and see each registration once, in batches."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial

@@ -4,8 +4,6 @@ The pose of a failure is wrong; without its cause, the same registration succeed
 whichever policy takes it after the same actions, so every outcome is kept.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from time import perf_counter

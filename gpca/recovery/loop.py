@@ -3,8 +3,6 @@
 Each policy also says what it would do about registrations that did not fail; nothing is done about those.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from time import perf_counter

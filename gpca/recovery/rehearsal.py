@@ -3,8 +3,6 @@
 The rehearsed failures also serve as queued cases, whose label is what solved them: cause, or outcome of each action.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import asdict, dataclass, field

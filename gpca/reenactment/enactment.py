@@ -4,8 +4,6 @@ A hypothesis says which observed points are outliers, how large the noise is and
 From this the pair is rebuilt without each of its causes, and registered again.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass

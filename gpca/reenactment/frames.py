@@ -4,8 +4,6 @@ As for whole objects, but the mixture is around the points that would be seen at
 hides the others. At a wrong pose another side would be seen, or much of it where nothing was measured.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property

@@ -6,8 +6,6 @@ factor of the square takes normals of its own, from other points. How firmly a d
 likelihood the pose loses at some distance along it: sampled planes are not smooth enough for derivatives.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@ model; the mixture (:mod:`gpca.reenactment.mixture`) refines the best ends, at l
 observed, where it lay before the registration, to the model: the identity is the initial pose.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache

@@ -5,8 +5,6 @@ needed. Expectation maximization moves the pose as ICP does, but each point is d
 weighted by how probable they are (Granger & Pennec 2002; Myronenko & Song 2010).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Re-enactments that know the truth about some of the causes: how much is lost by estimating each of them."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import replace
 

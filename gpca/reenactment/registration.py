@@ -5,8 +5,6 @@ around the target's, or outliers, and expectation maximization moves the pose. B
 the likeliest of many ends is the result (:mod:`gpca.reenactment.hypotheses`).
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Annotated
 

@@ -6,8 +6,6 @@ posterior is the larger one, as in the search for the pose; a density in the obs
 shrinking to a part of the model.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ As for whole objects, but neither scan holds all of the other, so both are cropp
 hypothesis. Noise is taken away by moving the source's common points to the target's planes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Settings of the re-enactment (docs/reenactment.md); nothing here needs the code that it runs."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated

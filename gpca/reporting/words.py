@@ -1,7 +1,5 @@
 """Writes numbers and names as words, the same way in every table and figure."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 

@@ -1,7 +1,5 @@
 """Two scans of one scene and their true pose: overlap, disturbed starts, and when a registration is correct."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -6,8 +6,6 @@ five lines for each pair (target, source, number of fragments; then T_target_sou
 it lines ``target,source,overlap``, as Huang et al. 2021 made them for this benchmark and for 3DLoMatch.
 """
 
-from __future__ import annotations
-
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace

@@ -5,8 +5,6 @@ of a room is what a camera sees that turns on its way through the room; a scan o
 circle around it. In rooms the camera has half of its noise, as fragments of rooms are fused from many frames.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

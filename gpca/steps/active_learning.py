@@ -1,7 +1,5 @@
 """Steps ``embed_without`` and ``learn_actively``: encoders that never saw a concept, and learning curves of it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

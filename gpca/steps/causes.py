@@ -1,7 +1,5 @@
 """The steps of registrations with measured causes: causes, descriptors, re-enactments, encoders, and the model file."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Step ``explain_controls``: registrations and embeddings -> predictions of every explainer under every control."""
 
-from __future__ import annotations
-
 import sys
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping

@@ -1,7 +1,5 @@
 """The steps of diagnoses: explainers of causes on held-out objects, on parts of what is read, and on depth frames."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Step ``learn_on_frames``: learning curves of a new concept on depth frames, from embeddings and from the pair."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any
 

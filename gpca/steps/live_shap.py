@@ -1,7 +1,5 @@
 """Step ``explain_live``: Shapley values by ``shap.KernelExplainer`` on a live function, beside those of a table."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from gpca.alignment.icp import ICPSettings

@@ -1,7 +1,5 @@
 """Step ``learn_new_concepts``: learning curves of a new concept where no encoder has seen the samples, or it."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator
 from dataclasses import replace

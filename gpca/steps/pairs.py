@@ -1,7 +1,5 @@
 """The steps of the paper's protocol: objects, registrations, uncertainty, encoders, and explainers' predictions."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from time import perf_counter
 

@@ -7,8 +7,6 @@
 The situation stays: the object, where it is cut off, the severity of every cause and the pose error.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property

@@ -5,12 +5,9 @@ asked about. Encoders of the aligned source are those of objects in both cases: 
 what learns from scans.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -36,9 +33,6 @@ from gpca.settings import fields_of, read_settings
 from gpca.steps.diagnosis import DESCRIBED, World, with_what_it_reads
 from gpca.steps.scan_trials import TrialSettings, pair_to_register
 from gpca.steps.scans import drawn_pairs
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 GlobalMethod = Callable[[ScanPair], np.ndarray | None]  # returns T_target_source (4×4), meters; None where it fails
 

@@ -5,8 +5,6 @@ initial pose (4, 4). It returns a pose T_target_source (4, 4), or that and its c
 None to abstain.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from dataclasses import replace

@@ -12,8 +12,6 @@
     source,seed,sample,score_nominal,score_noise,score_pose,score_overlap
 """
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The tracks: question, samples and headline measure of each."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import reduce

@@ -6,8 +6,6 @@ settings differ by the knobs alone. Remedies are for a pair whose cause is to be
 trim to the overlap. Whichever lowers the uncertainty points to the cause, and what was perturbed is not known.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cached_property
 from time import perf_counter

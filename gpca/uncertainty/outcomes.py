@@ -1,7 +1,5 @@
 """The outcomes of a design (designs.py) for S registrations: their files, and their form for explainers."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Settings of Monte-Carlo ICP and the conditions of each design; nothing here needs compiled loops."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Annotated, NamedTuple
 

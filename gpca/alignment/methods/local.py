@@ -6,8 +6,6 @@ outliers count less: Huber min(1, k/r), Cauchy 1/(1 + (r/k)²), Geman-McClure 1/
 k and nothing beyond.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from importlib import import_module
 from typing import Literal

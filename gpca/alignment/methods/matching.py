@@ -1,7 +1,5 @@
 """Global methods by packages: Open3D's RANSAC and fast global registration on FPFH features, and KISS-Matcher."""
 
-from __future__ import annotations
-
 import os
 from functools import cache
 from importlib import import_module

@@ -1,7 +1,5 @@
 """Coherent point drift (Myronenko & Song 2010) by the package pycpd, at the scale that is given."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import Annotated, Any
 

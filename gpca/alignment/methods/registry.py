@@ -1,7 +1,5 @@
 """Every registration method by name, one or several per file of this folder, and those that the re-enactment has."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from importlib.util import find_spec
 

@@ -8,8 +8,6 @@ Differences between two correspondences do not depend on the translation, and th
 4. its rotated points give the translation, by voting for each coordinate.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from gpca.alignment.features import MOST_NEIGHBORS, RADIUS, fpfh_of_pair, mutual_matches

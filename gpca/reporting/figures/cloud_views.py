@@ -1,7 +1,5 @@
 """Draws two clouds over each other, source on target, seen from one side: the farther a point, the paler it is."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

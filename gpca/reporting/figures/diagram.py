@@ -1,7 +1,5 @@
 """Draws diagrams whose parts are panels of data, on a canvas measured in inches, with boxes and arrows of one look."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from gpca.reporting.figures.style import GRAY, SMALL_PT, use_style

@@ -1,7 +1,5 @@
 """Lays out figures of one panel or many: room for all that stands around the panels is found automatically."""
 
-from __future__ import annotations
-
 from textwrap import wrap
 
 import numpy as np

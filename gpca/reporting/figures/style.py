@@ -1,7 +1,5 @@
 """Gives every figure of the suite one look, and writes it in one way: the same drawing gives the same bytes."""
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Builds a table row by row: it knows which rows have cells, which compete for bold, and what all tables say below."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
 

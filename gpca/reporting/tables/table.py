@@ -1,7 +1,5 @@
 """Writes a table as CSV for machines, Markdown for readers, LaTeX for the paper and JSON for the page."""
 
-from __future__ import annotations
-
 import csv
 import json
 import math

@@ -1,7 +1,5 @@
 """The files of a run that readings read, the values that they give, and the step that runs a group of readings."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path

@@ -5,8 +5,6 @@ of each seed. It has the predictions of encoders as published and of ICP from es
 (``real_world.published`` and ``conditions`` of the config).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np

@@ -3,8 +3,6 @@
 :class:`gpca.classifier.gpc.GPC` is one of these readings; the others change its start and nothing else.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 

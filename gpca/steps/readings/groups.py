@@ -3,8 +3,6 @@
 A reading is a combination of the values of a group's choices. ``config/readings.yaml`` has the values that are tried.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product

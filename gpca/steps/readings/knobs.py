@@ -1,7 +1,5 @@
 """SHAP and sensitivity analysis under other readings: the knobs of Monte-Carlo ICP, run anew on some test samples."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 

@@ -3,8 +3,6 @@
 The paper does not say whether a retraining starts anew, nor by which samples the inputs are scaled.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 

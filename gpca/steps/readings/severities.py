@@ -1,7 +1,5 @@
 """GP-CA by severity: on test samples that were perturbed weakly or strongly, and trained on such ranges."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 

@@ -4,8 +4,6 @@ Those in closed form, for the matches at the pose that was found, model how the 
 noise, and nothing else.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from gpca.rigid import point_jacobians

@@ -1,7 +1,5 @@
 """Examples for estimators that learn: descriptors of a registration, results of a few starts, the true twist."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Literal
 

@@ -4,8 +4,6 @@ All lengths are in diameters of the object, and twists are (rotation, translatio
 target's frame: T = exp(ξ) T̂.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Covariances that are learned from registrations of training objects: CELLO-3D, and an ensemble of networks."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

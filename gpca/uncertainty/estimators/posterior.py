@@ -4,8 +4,6 @@ Where the likelihood is right and points are many, it is as wide as the estimate
 again (the theorem of Bernstein and von Mises).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

@@ -1,7 +1,5 @@
 """Every estimator of a pose's covariance by name, one or a few per file of this folder."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import cast

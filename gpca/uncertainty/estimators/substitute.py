@@ -4,8 +4,6 @@ Clouds, jitter and cut are those of design ``additive`` (:mod:`gpca.uncertainty.
 the prior of an estimator, and has no effect on one that reads no start.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
