@@ -1,16 +1,11 @@
 """Learning curves of active learning: their files, with a row per round or per some arrivals, and their metrics."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from gpca.evaluation.measures import source_method_seed, tidy
 from gpca.io.csv_file import numbers, read_csv, write_csv
-
-if TYPE_CHECKING:
-    import pandas as pd
+from gpca.io.frame import Frame
 
 _ACCURACIES = ("accuracy", "accuracy_new")
 POOL_COLUMNS = ("setting", "held_out", "labels", "new_labels", *_ACCURACIES, "epochs")
@@ -33,7 +28,7 @@ def write_curves(
     write_csv(path, pd.concat(parts)[list(columns)])
 
 
-def read_curves(path: str | Path) -> dict[tuple[str, str], pd.DataFrame]:
+def read_curves(path: str | Path) -> dict[tuple[str, str], Frame]:
     rows = read_csv(path, _SHARED, others=(*POOL_COLUMNS, *STREAM_COLUMNS))
     for column in rows.columns[2:]:
         # Empty are the running accuracy before the first arrival, and accuracies without test samples.
@@ -41,7 +36,7 @@ def read_curves(path: str | Path) -> dict[tuple[str, str], pd.DataFrame]:
     return {key: part.reset_index(drop=True) for key, part in rows.groupby(["setting", "held_out"], sort=False)}
 
 
-def collect_curves(files: Iterable[str | Path], target: float) -> pd.DataFrame:
+def collect_curves(files: Iterable[str | Path], target: float) -> Frame:
     """Return the tidy metrics of files named `…/{source}/{strategy}/seed{seed}.csv`; results/README.md lists them."""
     curves = {source_method_seed(path): read_curves(path) for path in files}
     records = []
@@ -59,7 +54,7 @@ def collect_curves(files: Iterable[str | Path], target: float) -> pd.DataFrame:
     return tidy(records, "active learning")
 
 
-def pool_metrics(curve: pd.DataFrame, target: float) -> dict[str, float]:
+def pool_metrics(curve: Frame, target: float) -> dict[str, float]:
     """Return the metrics of one learning curve; labels and epochs are lower bounds if the target is missed.
 
     ``epochs_to_target`` sums all retrainings, ``epochs_at_target`` is that of the one that reached the target.
@@ -79,7 +74,7 @@ def pool_metrics(curve: pd.DataFrame, target: float) -> dict[str, float]:
     }
 
 
-def area_under_curve(curve: pd.DataFrame) -> float:
+def area_under_curve(curve: Frame) -> float:
     """Return the area under accuracy over labels (trapezoids), divided by the number of labels."""
     import numpy as np
 
@@ -87,7 +82,7 @@ def area_under_curve(curve: pd.DataFrame) -> float:
     return float(np.trapezoid(accuracies, labels) / labels[-1]) if labels[-1] else float(accuracies[0])
 
 
-def stream_metrics(curve: pd.DataFrame) -> dict[str, float]:
+def stream_metrics(curve: Frame) -> dict[str, float]:
     """Return the metrics of one stream.
 
     The delay is the number of arrivals from the first row with samples of the new concept until its accuracy reaches

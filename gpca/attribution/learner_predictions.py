@@ -1,10 +1,7 @@
 """Predictions of learners for samples like and unlike those of the training, and how far they can be believed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,10 +12,8 @@ from gpca.errors import InputError
 from gpca.evaluation.intervals import Clustered, Estimate
 from gpca.evaluation.measures import source_method_seed
 from gpca.io.csv_file import numbers
+from gpca.io.frame import Frame
 from gpca.pairs.shifted_sets import DISTANCES, TRAINED_ON, ShiftedSets, with_training_like
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 SCORES = ("max_score", "entropy", "bald", "variance")  # not every learner has the last two
 
@@ -60,30 +55,30 @@ def read_learner_predictions(prediction_files: Iterable[str | Path], set_files: 
     return predictions
 
 
-def sets_of(rows: pd.DataFrame) -> dict[str, pd.DataFrame]:
+def sets_of(rows: Frame) -> dict[str, Frame]:
     """Rows of every set, and of every shifted set together with those that are like the training."""
     alone = {name: rows[rows["set"] == name] for name in TRAINED_ON if (rows["set"] == name).any()}
     shifted = [name for name in alone if TRAINED_ON[name] != name]
     return alone | {with_training_like(name): rows[rows["set"].isin([name, TRAINED_ON[name]])] for name in shifted}
 
 
-def probabilities(rows: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
+def probabilities(rows: Frame) -> tuple[np.ndarray, np.ndarray]:
     """p_S_C, and the numbers target_S of the true concepts."""
     concepts = concepts_of(rows)
     target_S = rows["concept_true"].map(concepts.index).to_numpy()
     return rows[[f"score_{concept}" for concept in concepts]].to_numpy(), target_S
 
 
-def wrong(rows: pd.DataFrame) -> np.ndarray:
+def wrong(rows: Frame) -> np.ndarray:
     """Mask (S,) of the samples that were named wrongly, or not at all."""
     return ((rows["concept_true"] != rows["concept_predicted"]) | rows["abstained"]).to_numpy()
 
 
-def scores_of(rows: pd.DataFrame) -> list[str]:
+def scores_of(rows: Frame) -> list[str]:
     return [score for score in SCORES if score in rows]
 
 
-def estimates_of_scores(rows: pd.DataFrame, samples: Clustered) -> dict[str, Estimate]:
+def estimates_of_scores(rows: Frame, samples: Clustered) -> dict[str, Estimate]:
     """Accuracy, mean confidence, ece, nll and Brier score of the samples, given their rows of predictions."""
     p_S_C, target_S = probabilities(rows)
     p_true_S = np.maximum(p_S_C[np.arange(len(target_S)), target_S], LEAST_PROBABILITY)

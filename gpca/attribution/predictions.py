@@ -14,10 +14,9 @@ import numpy as np
 from gpca.errors import InputError
 from gpca.io.container import require_same_samples
 from gpca.io.csv_file import numbers, read_columns, read_csv, write_columns
+from gpca.io.frame import Frame
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from gpca.classifier.scores import Attribution
     from gpca.pairs.dataset import Registrations
 
@@ -33,7 +32,7 @@ def write_predictions(path: str | Path, registrations: Registrations, attributio
     write_columns(path, _columns(registrations, attribution))
 
 
-def prediction_frame(registrations: Registrations, attribution: Attribution) -> pd.DataFrame:
+def prediction_frame(registrations: Registrations, attribution: Attribution) -> Frame:
     import pandas as pd
 
     return pd.DataFrame(_columns(registrations, attribution))
@@ -56,7 +55,7 @@ def _columns(registrations: Registrations, attribution: Attribution) -> dict[str
     }
 
 
-def read_predictions(path: str | Path, labels: Sequence[str] = ()) -> pd.DataFrame:
+def read_predictions(path: str | Path, labels: Sequence[str] = ()) -> Frame:
     """Read a prediction file as text, but for `score_…`, `variance_…` and `icp_calls` (numbers) and `abstained` (bool).
 
     A sample may occur once for each combination of entries of the `labels`, columns before its own.
@@ -74,7 +73,7 @@ def read_predictions(path: str | Path, labels: Sequence[str] = ()) -> pd.DataFra
     return rows
 
 
-def concepts_of(predictions: pd.DataFrame) -> list[str]:
+def concepts_of(predictions: Frame) -> list[str]:
     """Return the concepts that predictions score, in the order of their columns."""
     return [name.removeprefix("score_") for name in predictions.columns if name.startswith("score_")]
 
@@ -94,7 +93,7 @@ def read_timings(path: str | Path, registrations: Registrations) -> tuple[np.nda
     return np.asarray(rows["seconds"]), np.asarray(rows["icp_seconds"])
 
 
-def require_samples(path: str | Path, rows: pd.DataFrame, keys: Iterable[str] = ("split", "sample")) -> None:
+def require_samples(path: str | Path, rows: Frame, keys: Iterable[str] = ("split", "sample")) -> None:
     """Raise an InputError unless each sample of a split stands once."""
     if rows.duplicated(list(keys)).any():
         raise InputError(path, "contains a sample twice", "regenerate it")

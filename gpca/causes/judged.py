@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,11 +19,9 @@ from gpca.errors import InputError
 from gpca.evaluation.intervals import ANYTHING, mean_ranks, weighted_mean
 from gpca.evaluation.measures import SHARE, Measure, source_method_seed
 from gpca.io.container import require_same_samples
+from gpca.io.frame import Frame
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import seed_of_file
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 CEILING = "ceiling"  # the truth, measured again from other starts: no explainer can be expected to do better
 RECALL = 0.9  # of the failed, at which false alarms are counted
@@ -104,7 +101,7 @@ def joined(parts: Iterable[Judged]) -> Judged:
     return Judged(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Judged)))
 
 
-def judged_by(rows: pd.DataFrame, truth: Causes, seed: int) -> Judged:
+def judged_by(rows: Frame, truth: Causes, seed: int) -> Judged:
     """Return test samples with the predictions of a file whose rows are in the same order."""
     scores_N_4 = rows[[f"score_{label}" for label in LABELS]].to_numpy(float)
     return judged_of(truth, seed, scores_N_4, np.where(rows["abstained"], "", rows["concept_predicted"].to_numpy(str)))

@@ -12,7 +12,6 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -24,6 +23,7 @@ from gpca.causes.dataset import Causes
 from gpca.causes.measuring import Measuring, RecordedPair, Subject, found_in, measure_cases
 from gpca.causes.settings import FEWEST_POINTS, CauseSettings
 from gpca.causes.truth import NONE
+from gpca.io.frame import Frame
 from gpca.objects.canonical import DRAWN
 from gpca.pairs.distances import dots
 from gpca.pairs.perturbation import CONCEPTS, NOISE, OVERLAP, POSE
@@ -33,10 +33,6 @@ from gpca.scans.pair import ROOM_M, ScanPair, ScanSuccess
 from gpca.scans.scene import ScanPairs
 from gpca.seeds import generator
 from gpca.uncertainty.spread import divergence
-
-if TYPE_CHECKING:
-    import pandas as pd
-
 
 JUDGED_POINTS = 512  # of the common surface, over which an error is the root mean square
 NORMAL_DEVIATION = 1.4826  # of a normal distribution, in median distances from its mean
@@ -200,7 +196,7 @@ def measure_scans(
     settings: CauseSettings,
     success: ScanSuccess,
     points: int,
-) -> tuple[Causes, pd.DataFrame]:
+) -> tuple[Causes, Frame]:
     """Measure the causes of registrations from these starts, as :func:`gpca.causes.measuring.measure_cases` does.
 
     Pairs of which too few points, of so many of each scan at most, lie on surface that both see are left out.

@@ -5,12 +5,10 @@ ones; the counts of verdicts then carry no information about the rows. Joint rea
 numbers with equal weights of tables (docs/comparison.md); its chance is that of permuted printed numbers.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import product
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,10 +16,8 @@ from gpca.comparison import verdicts
 from gpca.comparison.published import TIMES, UNITS, Number
 from gpca.comparison.values import Reproduced
 from gpca.comparison.verdicts import Printed, Tolerance
+from gpca.io.frame import Frame
 from gpca.seeds import generator
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 SHUFFLES = 10_000
 ALL = "all"
@@ -40,7 +36,7 @@ class Agreement(NamedTuple):
     rho: float  # Spearman's rank correlation, with ranks within each column; NaN where no column has two values
 
 
-def chance(comparison: pd.DataFrame, tolerances: Mapping[str, Tolerance]) -> dict[str, Agreement]:
+def chance(comparison: Frame, tolerances: Mapping[str, Tolerance]) -> dict[str, Agreement]:
     """Return table (and `ALL`) -> agreement of the judged means of a comparison, each value once."""
     rows = verdicts.judged_once(comparison)
     rows = rows[rows["verdict"].isin(verdicts.JUDGED)]

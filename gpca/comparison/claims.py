@@ -6,15 +6,13 @@ as" is supported by two one-sided tests: the whole interval lies within the marg
 that is smaller than the margin is no refutation, and has a verdict of its own.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -26,10 +24,8 @@ from gpca.comparison.verdicts import INCONCLUSIVE, NOT_COMPARABLE, NOT_RUN
 from gpca.evaluation.intervals import NO_WIDTH, mean_interval, student_factor
 from gpca.evaluation.measures import ALL, TIDY_COLUMNS, source_method_seed
 from gpca.io.csv_file import read_numbers
+from gpca.io.frame import Frame
 from gpca.io.structured_text import load_own_yaml
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 CLAIMS = Path(__file__).with_name("claims.yaml")
 PREDICTIONS = "predictions"  # in the place of a file: scores' measures that are computed from predictions
@@ -115,12 +111,12 @@ def counterparts_of(claims: Iterable[Claim]) -> list[Counterpart]:
 
 def judge(
     claims: Sequence[Claim],
-    results: Mapping[str, pd.DataFrame],
+    results: Mapping[str, Frame],
     objects: Mapping[str, Mapping],
     prediction_files: Iterable[str | Path] = (),
     clusters: Mapping[Counterpart, ShareDraws] = MappingProxyType({}),
     floors: Mapping[str, float] = MappingProxyType({}),
-) -> pd.DataFrame:
+) -> Frame:
     """Return `CLAIM_COLUMNS`, a row per comparison, or one for a claim without any.
 
     A claim is supported if all of its comparisons are. It is refuted, or smaller than the margin, if one comparison is
@@ -215,7 +211,7 @@ def verdict_of_interval(claim: Claim, low: float, high: float, may_rise: bool = 
 def difference_of(
     claim: Claim,
     compared: Compared,
-    results: Mapping[str, pd.DataFrame],
+    results: Mapping[str, Frame],
     clusters: Mapping[Counterpart, ShareDraws],
     levels: Iterable[float],
     floor: float | None = None,
@@ -271,7 +267,7 @@ def _cluster_bounds(
 
 
 def _runtime_difference(
-    claim: Claim, compared: Compared, rows: pd.DataFrame, levels: Iterable[float]
+    claim: Claim, compared: Compared, rows: Frame, levels: Iterable[float]
 ) -> ClaimDifference | None:
     """Compare mean seconds of independent measurements; logarithms by the delta method."""
     means = [mean for counterpart in compared.counterparts if (mean := runtime_mean(rows, counterpart)) is not None]
@@ -288,7 +284,7 @@ def _runtime_difference(
     return ClaimDifference(value, {level: (value - width, value + width) for level, width in widths.items()}, n)
 
 
-def score_measures(claims: Sequence[Claim], prediction_files: Iterable[str | Path]) -> pd.DataFrame:
+def score_measures(claims: Sequence[Claim], prediction_files: Iterable[str | Path]) -> Frame:
     """Return tidy rows of ece and :func:`separability` of the scores in prediction files that the claims compare."""
     import pandas as pd
 
@@ -320,7 +316,7 @@ def separability(p_S_C: np.ndarray, target_S: np.ndarray) -> float:
     return float(np.mean(areas)) if areas else math.nan
 
 
-def read_verdicts(path: str | Path) -> pd.DataFrame:
+def read_verdicts(path: str | Path) -> Frame:
     """Read what :func:`judge` returned; claims that were not run have no numbers."""
     measured = ("value", "low", "high", "n")
     return read_numbers(path, CLAIM_COLUMNS, measured, optional=measured)

@@ -1,21 +1,16 @@
 """The paper's claims in sentences, with the differences in this run that support or refute each."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from gpca.comparison.claims import CLAIM_VERDICTS
 from gpca.comparison.verdicts import NOT_RUN
+from gpca.io.frame import Frame
 from gpca.objects.entry import title_of
 from gpca.reporting.tables.builder import TableBuilder
 from gpca.reporting.tables.table import Cell, Column, Table
 from gpca.reporting.words import plural, span
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 COMPONENTS = "components"  # of the runtime
 HEADS = {"claim": "The paper", "claim_verdict": "Verdict", "source": "Dataset", "table": "Samples"}
@@ -41,7 +36,7 @@ class DifferenceColumn(Column):
         return f"{cell.mean:.3g}{interval}"
 
 
-def claims(verdicts: pd.DataFrame, sources: Mapping[str, Mapping], titles: Mapping[str, str]) -> Table:
+def claims(verdicts: Frame, sources: Mapping[str, Mapping], titles: Mapping[str, str]) -> Table:
     """Return a row per comparison, below the sentence that it belongs to; titles are those of methods."""
 
     def titled(name: str) -> str:
@@ -84,14 +79,14 @@ def claims(verdicts: pd.DataFrame, sources: Mapping[str, Mapping], titles: Mappi
     )
 
 
-def counted(verdicts: pd.DataFrame) -> str:
+def counted(verdicts: Frame) -> str:
     """Return how many sentences have each verdict, in words."""
     counts = verdicts.drop_duplicates("claim")["claim_verdict"].value_counts(sort=False)
     phrases = (f"{counts[verdict]} {verdict}" for verdict in CLAIM_VERDICTS if verdict in counts)
     return f"Of {counts.sum()} sentences: {', '.join(phrases)}."
 
 
-def margins_in_words(verdicts: pd.DataFrame) -> list[str]:
+def margins_in_words(verdicts: Frame) -> list[str]:
     """Return a sentence on when the margins of the claims were set, and what was known by then."""
     once = verdicts.drop_duplicates("claim")
     phrases = []

@@ -5,13 +5,11 @@ choice, of length 1 where they do not depend on it. The share of close numbers o
 arrays, also for permuted printed numbers.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -21,10 +19,8 @@ from gpca.comparison.published import UNITS, Number
 from gpca.comparison.verdicts import Tolerance
 from gpca.errors import InputError
 from gpca.io.csv_file import read_csv, read_numbers
+from gpca.io.frame import Frame
 from gpca.settings import Distinct, Keys, OpenShare
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 SEVERITIES = "severities"
 PROTOCOL = "protocol"  # the severities of the protocol
@@ -105,7 +101,7 @@ class Found(NamedTuple):
 def search(
     numbers: Sequence[Number],
     printed: Sequence[Number],
-    measured: pd.DataFrame,
+    measured: Frame,
     grid: Mapping[str, Sequence[Any]],
     tolerances: Mapping[str, Tolerance],
     deals: int,
@@ -154,7 +150,7 @@ def search(
     return Found(joint, largest, np.array(close_K), best, equals, share_G.size, protocol, by_chance)
 
 
-def values_of(number: Number, measured: pd.DataFrame) -> dict[str, tuple[float, bool]]:
+def values_of(number: Number, measured: Frame) -> dict[str, tuple[float, bool]]:
     """Name of a part -> mean over the seeds in the number's unit, and whether some of it is a lower bound."""
     counterpart = number.counterpart
     assert counterpart
@@ -223,9 +219,9 @@ def scores_of_values(
 
 def judge(
     numbers: Sequence[Number],
-    joint: pd.DataFrame,
-    comparison: pd.DataFrame,
-    readings: pd.DataFrame,
+    joint: Frame,
+    comparison: Frame,
+    readings: Frame,
     tolerances: Mapping[str, Tolerance],
     deals: int,
 ) -> tuple[list[tuple], list[Record]]:
@@ -253,7 +249,7 @@ def judge(
     return rows, records + scores_of_values(numbers, run_values, tolerances, deals, JUDGED)
 
 
-def read_verdicts(path: str | Path) -> pd.DataFrame:
+def read_verdicts(path: str | Path) -> Frame:
     """Read the rows that :func:`judge` returned."""
     optional = ("upper", "reproduced")
     measured = ("published", "joint", "n", "readings", "readings_close", *optional)
@@ -261,7 +257,7 @@ def read_verdicts(path: str | Path) -> pd.DataFrame:
     return rows.assign(**{column: rows[column] == "True" for column in FLAGS})
 
 
-def read_choices(path: str | Path) -> pd.DataFrame:
+def read_choices(path: str | Path) -> Frame:
     """Read the values of the joint reading's choices: `choice`, `value`."""
     rows = read_csv(path, ("choice", "value"))
     if rows["choice"].tolist() != list(CHOICES):

@@ -1,25 +1,20 @@
 """Writes the comparison as Markdown: how often each verdict and chance, then a table for each of the paper's."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING
 
 from gpca.comparison.chance import ALL, SHUFFLES, chance
 from gpca.comparison.published import HARDWARE, TABLES, TEXT
 from gpca.comparison.verdicts import VERDICTS, Tolerance, counts, judged_once
+from gpca.io.frame import Frame
 from gpca.objects.entry import STAND_IN
 from gpca.reporting.tables.table import EMPTY
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 _HEADS = ("Row", "Column", "Unit", "Paper", "Here", "Over objects", "n", "Difference", "Verdict")
 _CHANCE = ("by chance", "p", "ρ")
 
 
-def comparison_markdown(comparison: pd.DataFrame, tolerances: Mapping[str, Tolerance]) -> str:
+def comparison_markdown(comparison: Frame, tolerances: Mapping[str, Tolerance]) -> str:
     """Return the page of what :func:`gpca.comparison.verdicts.compare` returns, with the tolerances of each unit."""
     parts = ["# Published and reproduced", summary(comparison), counts_table(comparison, tolerances)]
     if (by_chance := chance(comparison, tolerances).get(ALL)) is not None:
@@ -49,11 +44,11 @@ def comparison_markdown(comparison: pd.DataFrame, tolerances: Mapping[str, Toler
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
-def summary(comparison: pd.DataFrame) -> str:
+def summary(comparison: Frame) -> str:
     """Return the counts: means, each value once, by verdict; standard deviations and repeats apart."""
     once, deviations, repeats = _parts(comparison)
 
-    def in_words(rows: pd.DataFrame) -> str:
+    def in_words(rows: Frame) -> str:
         return ", ".join(f"{count} {verdict}" for verdict, count in counts(rows).items() if count)
 
     sentences = [f"Of {len(comparison)} printed numbers, {len(once)} are means, each judged once: {in_words(once)}."]
@@ -66,7 +61,7 @@ def summary(comparison: pd.DataFrame) -> str:
     return " ".join(sentences)
 
 
-def counts_table(comparison: pd.DataFrame, tolerances: Mapping[str, Tolerance]) -> str:
+def counts_table(comparison: Frame, tolerances: Mapping[str, Tolerance]) -> str:
     """Return the counts of each verdict, a row for each of the paper's tables, beside what shuffled values reach."""
     once, deviations, repeats = _parts(comparison)
     by_chance = chance(comparison, tolerances)
@@ -87,7 +82,7 @@ def counts_table(comparison: pd.DataFrame, tolerances: Mapping[str, Tolerance]) 
     return _joined(lines)
 
 
-def _parts(comparison: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
+def _parts(comparison: Frame) -> tuple[Frame, Frame, Frame]:
     """Return means judged once, standard deviations, and repeats."""
     repeats = comparison["repeat_of"] != ""
     return judged_once(comparison), comparison[(comparison["statistic"] == "deviation") & ~repeats], comparison[repeats]
@@ -105,7 +100,7 @@ def _joined(lines: Iterable[Iterable]) -> str:
     return "\n".join(f"| {' | '.join(map(str, line))} |" for line in lines)
 
 
-def _table(rows: pd.DataFrame, number_of: Mapping[str, int]) -> str:
+def _table(rows: Frame, number_of: Mapping[str, int]) -> str:
     lines = [list(_HEADS), [":--"] * 3 + ["--:"] * 5 + [":--"]]
     for row in rows.itertuples():
         mark = f" [{number_of[row.reason]}]" if row.reason else ""

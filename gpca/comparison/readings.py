@@ -1,23 +1,19 @@
 """Which readings of what the paper leaves open give a value close to each printed number (docs/comparison.md)."""
 
-from __future__ import annotations
-
 import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from gpca.comparison.published import Number
 from gpca.comparison.values import value_of_run
 from gpca.comparison.verdicts import NOT_COMPARABLE, NOT_REPRODUCED, Tolerance, distance
 from gpca.io import csv_file
 from gpca.io.csv_file import read_csv
-
-if TYPE_CHECKING:
-    import pandas as pd
+from gpca.io.frame import Frame
 
 READINGS = "readings.csv"
 NUMBER = ["table", "row", "column"]
@@ -28,8 +24,8 @@ READING_COLUMNS = (
 
 
 def judge_readings(
-    numbers: Sequence[Number], comparison: pd.DataFrame, readings: pd.DataFrame, tolerances: Mapping[str, Tolerance]
-) -> pd.DataFrame:
+    numbers: Sequence[Number], comparison: Frame, readings: Frame, tolerances: Mapping[str, Tolerance]
+) -> Frame:
     """Return `READING_COLUMNS`, a row per printed number and reading that has a value in its place.
 
     The distance is in units of the close tolerance, in logarithms for a ratio; the chance is that of :func:`chance_of`.
@@ -39,9 +35,7 @@ def judge_readings(
     import pandas as pd
 
     judged = comparison.set_index(NUMBER)[["reproduced", "verdict"]]
-    rows_by_place: dict[tuple, dict[str, pd.DataFrame]] = defaultdict(
-        dict
-    )  # source, method and concept -> table -> rows
+    rows_by_place: dict[tuple, dict[str, Frame]] = defaultdict(dict)  # source, method and concept -> table -> rows
     for (name, *place), rows in readings.groupby(["table", "source", "method", "concept"], sort=False):
         rows_by_place[tuple(place)][name] = rows
     records = []
@@ -112,12 +106,12 @@ class GroupSummary(NamedTuple):
         return "produced" if self.close else "between" if self.inside else "outside"
 
 
-def unresolved(judged: pd.DataFrame) -> pd.DataFrame:
+def unresolved(judged: Frame) -> Frame:
     """Return the rows of numbers that are not reproduced, or not comparable because of their objects."""
     return judged[judged["verdict"].isin([NOT_REPRODUCED, NOT_COMPARABLE])]
 
 
-def summarize(judged: pd.DataFrame) -> dict[tuple[str, str, str], dict[str, GroupSummary]]:
+def summarize(judged: Frame) -> dict[tuple[str, str, str], dict[str, GroupSummary]]:
     """Return number -> group -> summary of its readings, for the numbers of :func:`unresolved`."""
     joint = {}
     for group, rows in judged.groupby("group", sort=False):
@@ -159,7 +153,7 @@ def sentence(groups: Mapping[str, GroupSummary], words: ModuleType) -> str:
     return " ".join(sentences)
 
 
-def with_readings(comparison: pd.DataFrame, judged: pd.DataFrame, words: ModuleType) -> pd.DataFrame:
+def with_readings(comparison: Frame, judged: Frame, words: ModuleType) -> Frame:
     """Return the comparison with the readings' values in the reasons of misses."""
     summaries = summarize(judged[judged["verdict"] == NOT_REPRODUCED])
     reasons = [
@@ -169,7 +163,7 @@ def with_readings(comparison: pd.DataFrame, judged: pd.DataFrame, words: ModuleT
     return comparison.assign(reason=reasons)
 
 
-def read_judged(path: str | Path) -> pd.DataFrame:
+def read_judged(path: str | Path) -> Frame:
     """Read the rows that :func:`judge_readings` returned."""
     rows = read_csv(path, READING_COLUMNS)
     needed = {"distance": rows["distance"] != "-inf", "reproduced": rows["reproduced"] != ""}  # -inf: ratio of zero

@@ -5,13 +5,11 @@ concept (for ``runtime.csv``: components, model, component, seconds and device),
 An ``@`` stands for the entry of the printed number's counterpart.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,11 +17,9 @@ from gpca.comparison.published import TIMES, Counterpart, Number, Reason, reason
 from gpca.comparison.values import RUNTIME, Reproduced, ShareDraws, deviation_interval, value_of_run
 from gpca.errors import InputError
 from gpca.evaluation.intervals import student_factor
+from gpca.io.frame import Frame
 from gpca.objects.entry import STAND_IN, title_of
 from gpca.settings import NotNegative
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 REPRODUCED, CLOSE, INCONCLUSIVE, NOT_REPRODUCED = "reproduced", "close", "inconclusive", "not reproduced"
 NOT_COMPARABLE, NOT_RUN = "not comparable", "not run"
@@ -134,13 +130,13 @@ def distance(number: Number, value: float, tolerance: Tolerance) -> float:
 
 def compare(
     numbers: Sequence[Number],
-    results: Mapping[str, pd.DataFrame],
+    results: Mapping[str, Frame],
     objects: Mapping[str, Mapping],
     tolerances: Mapping[str, Tolerance],
     reasons: Sequence[Reason],
     hardware: str = "",
     clusters: Mapping[Counterpart, ShareDraws] | None = None,
-) -> pd.DataFrame:
+) -> Frame:
     """Return `COMPARISON_COLUMNS`, a row per printed number, in its unit.
 
     Args:
@@ -211,12 +207,12 @@ def compare(
     return pd.DataFrame(records, columns=list(COMPARISON_COLUMNS)).astype({"n": "Int64"})
 
 
-def judged_once(comparison: pd.DataFrame) -> pd.DataFrame:
+def judged_once(comparison: Frame) -> Frame:
     """Return the rows of means, without those that repeat a value of the run that is judged in another row."""
     return comparison[(comparison["statistic"] == "mean") & (comparison["repeat_of"] == "")]
 
 
-def counts(comparison: pd.DataFrame) -> dict[str, int]:
+def counts(comparison: Frame) -> dict[str, int]:
     """Return verdict -> number of rows."""
     return {verdict: int((comparison["verdict"] == verdict).sum()) for verdict in VERDICTS}
 
@@ -240,7 +236,7 @@ def cited_number(number: Number, fields: Mapping[str, str]) -> Number | None:
     return replace(number, unit=fields["unit"], counterpart=replace(counterpart, **cited))
 
 
-def filled(text: str, number: Number, results: Mapping[str, pd.DataFrame]) -> str:
+def filled(text: str, number: Number, results: Mapping[str, Frame]) -> str:
     """Return a reason for a number with the run's values; sentences that cite what the run lacks are left out."""
     sentences = []
     for sentence in _SENTENCES.split(text):

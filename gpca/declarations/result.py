@@ -18,14 +18,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from gpca.declarations.experiment import Tidy
+from gpca.io.frame import Frame as Frame
+from gpca.io.frame import Series as Series
 from gpca.reporting.registry import Input, Result
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Figure
-    from pandas import DataFrame as Frame
-    from pandas import Series as Series
-else:  # planning imports neither
-    Figure = Frame = Series = Any
+else:  # planning does not import it
+    Figure = Any
 
 READ_ROWS = "gpca.evaluation.measures:read_rows"
 Given = str | tuple[Callable, str | Sequence[str] | Mapping[str, str]]

@@ -1,14 +1,9 @@
 """The file of runtimes: a row per component and device, as the step ``runtime`` measures them."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from gpca.io.csv_file import read_numbers
-
-if TYPE_CHECKING:
-    import pandas as pd
+from gpca.io.frame import Frame
 
 RUNTIME_COLUMNS = ("component", "device", "hardware", "threads", "repeats", "mean_s", "deviation_s", "median_s")
 COMPONENTS = {  # what the table calls them, in its order
@@ -25,5 +20,5 @@ COMPONENTS = {  # what the table calls them, in its order
 OF_ONE_EXPLANATION = ("icp", "features", "sampling", "scores")
 
 
-def read_runtime(path: str | Path) -> pd.DataFrame:
+def read_runtime(path: str | Path) -> Frame:
     return read_numbers(path, RUNTIME_COLUMNS, ("threads", "repeats", "mean_s", "deviation_s", "median_s"))

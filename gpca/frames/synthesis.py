@@ -3,16 +3,15 @@
 Overlap is lost to an occluder: the silhouette of another object is moved over the mask, as if it stood in front.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from gpca.alignment.pose_error import JUDGED_POINTS, pose_error
 from gpca.frames.instances import Instances
 from gpca.io.files import SPLITS
+from gpca.io.frame import Frame
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Perturbed
@@ -22,9 +21,6 @@ from gpca.process.progress import progress
 from gpca.rigid import inverse, scale_translation, transform
 from gpca.seeds import generator
 from gpca.settings import OpenShare, Share
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 OCCLUDER, HALF_SPACE = "occluder", "half_space"
 STEP_PX = 2
@@ -42,7 +38,7 @@ class FrameSettings:
 
 def make_frame_registrations(
     instances: Instances, objects: ObjectClouds, source: str, seed: int, settings: FrameSettings
-) -> tuple[Registrations, np.ndarray, pd.DataFrame]:
+) -> tuple[Registrations, np.ndarray, Frame]:
     """Return aligned pairs of instances, perturbed about their initial poses, the seconds (S,) of ICP, a row for each.
 
     Samples 3t, 3t + 1 and 3t + 2 of a split show one instance under the three concepts in random order; instances take

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 from functools import partial
 from math import floor
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -19,10 +19,8 @@ from gpca.evaluation.measures import ALL
 from gpca.frames.source import REAL_WORLD
 from gpca.guarantee.guarantee import STATES, calibrate, state_scores
 from gpca.io.csv_file import read_numbers, write_csv
+from gpca.io.frame import Frame
 from gpca.settings import OpenShare
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 SCORES = tuple(f"score_{label}" for label in LABELS)
 TEXTS = ("model", "source", "sample", "family", "state")
@@ -91,7 +89,7 @@ class Scored:
     @classmethod
     def load(cls, path: str | Path) -> Scored:
         """Read the CSV."""
-        rows: pd.DataFrame = read_numbers(path, (*TEXTS, *NUMBERS, *SCORES), (*NUMBERS, *SCORES))
+        rows: Frame = read_numbers(path, (*TEXTS, *NUMBERS, *SCORES), (*NUMBERS, *SCORES))
         if unknown := set(rows["state"]) - set(STATES):
             raise InputError(path, f"unknown state '{min(unknown)}'", f"its states are {', '.join(STATES)}")
         return cls(

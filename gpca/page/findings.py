@@ -1,10 +1,8 @@
 """The findings at the top of a run's page: sentences with the numbers of its files."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,11 +13,9 @@ from gpca.evaluation.intervals import UNTRAINED
 from gpca.evaluation.measures import ALL, POOLED, read_clustered, read_metrics
 from gpca.experiments.frames import read_together
 from gpca.explainers.gpca import GPCA_FORMS
+from gpca.io.frame import Frame
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.words import plural
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 RULE = "rule"
 PAPERS_RIVALS = {"shap_additive": "SHAP", "sa_local_additive": "sensitivity analysis"}
@@ -43,7 +39,7 @@ class Titles(NamedTuple):
 
 def findings_of(folder: Path, titles: Titles, shown: Collection[str]) -> list[Finding]:
     """Return the findings from the collected files in ``results/{run}`` whose results are shown."""
-    readers: dict[str, tuple[Callable, Callable[[pd.DataFrame, Titles], Iterator[Finding]]]] = {
+    readers: dict[str, tuple[Callable, Callable[[Frame, Titles], Iterator[Finding]]]] = {
         "metrics.csv": (read_metrics, _concepts),
         "cause_intervals.csv": (read_clustered, _causes),
         "real_world.csv": (read_together, _frames),
@@ -57,7 +53,7 @@ def findings_of(folder: Path, titles: Titles, shown: Collection[str]) -> list[Fi
     return [finding for finding in findings if finding.result in shown]
 
 
-def _concepts(metrics: pd.DataFrame, titles: Titles) -> Iterator[Finding]:
+def _concepts(metrics: Frame, titles: Titles) -> Iterator[Finding]:
     accuracies = _accuracies(metrics)
     if RULE in accuracies:
         text = (
@@ -100,7 +96,7 @@ def _concepts(metrics: pd.DataFrame, titles: Titles) -> Iterator[Finding]:
         yield Finding(share, text, "table1_extended")
 
 
-def _causes(intervals: pd.DataFrame, titles: Titles) -> Iterator[Finding]:
+def _causes(intervals: Frame, titles: Titles) -> Iterator[Finding]:
     words = titles.cause_explainers
     rows, trained = _pooled(intervals, titles, "balanced_accuracy")
     if trained:
@@ -135,7 +131,7 @@ def _causes(intervals: pd.DataFrame, titles: Titles) -> Iterator[Finding]:
         yield Finding(left, text, "table9_causes")
 
 
-def _pooled(intervals: pd.DataFrame, titles: Titles, metric: str) -> tuple[pd.DataFrame, list[str]]:
+def _pooled(intervals: Frame, titles: Titles, metric: str) -> tuple[Frame, list[str]]:
     """Return the rows of a metric for all sources together, by explainer, and the trained explainers."""
     rows = intervals[(intervals["metric"] == metric) & (intervals["against"] == "")]
     source = POOLED if (rows["source"] == POOLED).any() else next(iter(rows["source"]), POOLED)
@@ -145,7 +141,7 @@ def _pooled(intervals: pd.DataFrame, titles: Titles, metric: str) -> tuple[pd.Da
     return rows, [name for name in titles.cause_explainers if name in rows.index and name not in UNTRAINED]
 
 
-def _frames(metrics: pd.DataFrame, titles: Titles) -> Iterator[Finding]:
+def _frames(metrics: Frame, titles: Titles) -> Iterator[Finding]:
     # Names are of backbone and reduction.
     if means := [accuracies.mean() for name, accuracies in _accuracies(metrics).items() if "-" in name]:
         span = _span(np.array(means))
@@ -153,7 +149,7 @@ def _frames(metrics: pd.DataFrame, titles: Titles) -> Iterator[Finding]:
         yield Finding(span, text, "table6_backbones")
 
 
-def _labels(metrics: pd.DataFrame, titles: Titles) -> Iterator[Finding]:
+def _labels(metrics: Frame, titles: Titles) -> Iterator[Finding]:
     bald, random = (_median_labels(metrics, name) for name in ("bald_kmeans", "random"))
     if bald and random:
         text = (
@@ -163,7 +159,7 @@ def _labels(metrics: pd.DataFrame, titles: Titles) -> Iterator[Finding]:
         yield Finding(bald, text, "table3_active_learning")
 
 
-def _recovery(metrics: pd.DataFrame, titles: Titles) -> Iterator[Finding]:
+def _recovery(metrics: Frame, titles: Titles) -> Iterator[Finding]:
     rows = metrics[(metrics["metric"] == f"recovered_within_{titles.budget}") & (metrics["concept"] == ALL)]
     shares = {name: _percent(share) for name, share in rows.groupby("method")["value"].mean().items()}
     if "gpca" in shares:
@@ -176,14 +172,14 @@ def _recovery(metrics: pd.DataFrame, titles: Titles) -> Iterator[Finding]:
         yield Finding(shares["gpca"], text, "table8_recovery")
 
 
-def _accuracies(metrics: pd.DataFrame) -> dict[str, np.ndarray]:
+def _accuracies(metrics: Frame) -> dict[str, np.ndarray]:
     """Return method -> mean accuracy over the seeds, by source."""
     rows = metrics[(metrics["metric"] == "accuracy") & (metrics["concept"] == ALL)]
     means = rows.groupby(["method", "source"])["value"].mean()
     return {str(method): accuracies.to_numpy() for method, accuracies in means.groupby(level="method")}
 
 
-def _median_labels(metrics: pd.DataFrame, strategy: str) -> str | None:
+def _median_labels(metrics: Frame, strategy: str) -> str | None:
     """Return the median number of labels over datasets and seeds, in words; a lower bound if it is censored."""
     rows = metrics[(metrics["table"] == TABLE + rare_setting(JUDGED_SHARE)) & (metrics["method"] == strategy)]
     rows = rows[rows["concept"].isin(CONCEPTS)].set_index(["source", "concept", "seed"])

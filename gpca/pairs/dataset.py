@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -14,12 +14,10 @@ from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays
 from gpca.io.container import Container, array, require_same_samples
 from gpca.io.csv_file import numbers, read_csv
 from gpca.io.files import SPLITS
+from gpca.io.frame import Frame
 from gpca.objects.sizes import LARGEST_DIAMETER_M, SMALLEST_DIAMETER_M
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.rigid import inverse, scale_translation, transform
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 FARTHEST = 1e3  # diameters from the target's center; a registration may fail, but nothing lies so far away
 SAMPLE_COLUMNS = ("sample", "split", "instance", "dataset", "in_training")  # of the CSV beside registrations of frames
@@ -140,7 +138,7 @@ def read_embedding(path: str | Path, registrations: Registrations, logits: bool 
     return {"embedding": arrays["h"]} | ({"head_logits": arrays["head_logits"]} if logits else {})
 
 
-def read_samples_of_frames(path: str | Path) -> pd.DataFrame:
+def read_samples_of_frames(path: str | Path) -> Frame:
     """Read the columns that identify samples of frames, as text but for `in_training`."""
     rows = read_csv(path, SAMPLE_COLUMNS, others=FRAME_COLUMNS)
     return rows.assign(in_training=rows["in_training"] == "True")

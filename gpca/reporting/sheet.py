@@ -1,19 +1,15 @@
 """Tables as rows × columns of selections: each says which rows of the measured numbers its cells show."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from gpca.io.frame import Frame
 from gpca.reporting.tables.builder import FAMILIES, Label, TableBuilder, over_clusters
 from gpca.reporting.tables.cells import cell_of_repeats, interval_cell, where
 from gpca.reporting.tables.table import Cell, Column, Table
 from gpca.reporting.words import span
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -53,13 +49,13 @@ def with_label(rows: Iterable[Row], label_of: Callable[[Row], str]) -> list[Row]
     return [replace(row, labels=[*row.labels, (label_of(row),) * 2]) for row in rows]
 
 
-def interval_of(rows: pd.DataFrame, column: Show) -> Cell | None:
+def interval_of(rows: Frame, column: Show) -> Cell | None:
     """Cell of the one row that a column chooses, with its interval; by default, a row that is no difference."""
     chosen = where(rows, {"against": ""} | dict(column.where))
     return interval_cell(chosen.iloc[0], factor=column.factor) if len(chosen) else None
 
 
-def mean_over_seeds(rows: pd.DataFrame, column: Show) -> Cell | None:
+def mean_over_seeds(rows: Frame, column: Show) -> Cell | None:
     """Cell of numbers by seed: the mean of each seed's mean; of as many test samples as the rows count in all."""
     values_R = column.factor * where(rows, column.where).groupby("seed")["value"].mean()
     samples = int(where(rows, {"metric": "test_samples"})["value"].sum())
@@ -86,12 +82,12 @@ class Sheet(TableBuilder):
         heads: Mapping[str, str],
         rows: Iterable[Row],
         columns: Mapping[str, Column],
-        intervals: pd.DataFrame,
-        by_seed: Mapping[str, pd.DataFrame] | None = None,
+        intervals: Frame,
+        by_seed: Mapping[str, Frame] | None = None,
         sources: Sequence[str] = (),
         blank: Callable[[Row, str], bool] = lambda row, key: False,
-        more: Callable[[Row, pd.DataFrame], Mapping[str, Cell | None]] = lambda row, subset: {},
-        cell: Callable[[pd.DataFrame, Show], Cell | None] = interval_of,
+        more: Callable[[Row, Frame], Mapping[str, Cell | None]] = lambda row, subset: {},
+        cell: Callable[[Frame, Show], Cell | None] = interval_of,
     ) -> None:
         super().__init__(name, heads)
         self.columns = columns
@@ -145,7 +141,7 @@ class Sheet(TableBuilder):
         return self.build(caption, across, columns, notes)
 
 
-def _over_sources(row: Row, column: Show, by_seed: Mapping[str, pd.DataFrame], sources: Sequence[str]) -> Cell | None:
+def _over_sources(row: Row, column: Show, by_seed: Mapping[str, Frame], sources: Sequence[str]) -> Cell | None:
     """Return the mean over the seeds of what all pairs of a seed have, whatever their source."""
     shared = {"method": row.where["method"], "concept": column.where["concept"]}
     counts = where(next(iter(by_seed.values())), shared | {"metric": "test_samples"})

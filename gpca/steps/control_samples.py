@@ -3,13 +3,11 @@
 Step ``train_control``: registrations -> embeddings by an encoder that is trained under a control.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 
@@ -18,6 +16,7 @@ from gpca.encoders.registry import OF_ANY_SIZE, EncoderSettings
 from gpca.errors import InputError
 from gpca.io.arrays import save_arrays
 from gpca.io.csv_file import write_csv
+from gpca.io.frame import Frame
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.objects.canonical import ObjectClouds, unseen
@@ -27,9 +26,6 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.rigid import inverse
 from gpca.seeds import generator
 from gpca.settings import Bounds, Count, Different, Distinct, read_settings
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 PAPER = "paper"  # the protocol itself, which every control is compared with
 Control = Literal["density", "unseen_objects", "hard", "reversed", "label_noise_30", "shuffled", "transfer"]
@@ -179,7 +175,7 @@ def relabeled(control: str, train: Registrations, *axes: object) -> Registration
     return replace(train, concept=concept)
 
 
-def sample_table(tested: Mapping[str, Registrations], objects: ObjectClouds) -> pd.DataFrame:
+def sample_table(tested: Mapping[str, Registrations], objects: ObjectClouds) -> Frame:
     """`SAMPLE_COLUMNS` of the test samples of each control; the error is the final ADD, or ADD-S, in diameters."""
     import pandas as pd
 

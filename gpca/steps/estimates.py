@@ -6,14 +6,11 @@ pose. Estimators that learn are trained three times: with samples of the same so
 with the mild half of the own; the latter two show what a shift does to them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,6 +22,7 @@ from gpca.causes.descriptors import observed_pair
 from gpca.causes.settings import CauseSettings
 from gpca.errors import InputError
 from gpca.io.csv_file import write_csv
+from gpca.io.frame import Frame
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.objects.canonical import ObjectClouds
@@ -40,9 +38,6 @@ from gpca.uncertainty.estimators.interface import CovarianceEstimate, Example, F
 from gpca.uncertainty.estimators.registry import estimator_entry, make_estimator
 from gpca.uncertainty.settings import start_deviation
 from gpca.uncertainty.spread import divergence
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 MOVED: Moved = "model"  # onto the observed cloud, as the causes' track has it
 LEVEL = 0.95  # of the region whose coverage is counted
@@ -174,7 +169,7 @@ def try_estimators(
     other: DrawnCauses | None,
     estimators: Mapping[str, Mapping],
     settings: EstimatorPairSettings,
-) -> tuple[dict[str, pd.DataFrame], list[EstimatedRow]]:
+) -> tuple[dict[str, Frame], list[EstimatedRow]]:
     """Rows, one per registration, of each reference and estimator by name; and the registrations.
 
     Rows have the seconds of an estimate, with those of the descriptors that it reads, without those of learning. Those

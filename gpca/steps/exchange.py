@@ -1,10 +1,8 @@
 """Step ``exchange``: every explainer with each registration method, or each estimator of uncertainty, in turn."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -17,6 +15,7 @@ from gpca.explainers.interface import ExplainerEntry, answer_of
 from gpca.explainers.registry import Embed, described_for, explainer_entry, make_rivals
 from gpca.io.csv_file import write_csv
 from gpca.io.files import SPLITS
+from gpca.io.frame import Frame
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.objects.canonical import ObjectClouds
@@ -31,9 +30,6 @@ from gpca.uncertainty.designs import ADDITIVE_KNOBS
 from gpca.uncertainty.estimators.registry import make_estimator
 from gpca.uncertainty.estimators.substitute import OBSERVED, KnobbedRegistrar
 from gpca.uncertainty.settings import UncertaintySettings
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 BALANCED = {"multipleOf": 3}  # over the concepts
 METHOD, ESTIMATOR = "method", "estimator"  # the two exchanges
@@ -114,7 +110,7 @@ class Exchange:
     rivals: Mapping[str, ExplainerEntry]
     embed: Embed
 
-    def run(self, registrations: Registrations, judges: Judges) -> pd.DataFrame:
+    def run(self, registrations: Registrations, judges: Judges) -> Frame:
         """Predictions of each explainer on the test samples: `LABELS`, the columns of a prediction file, `FAILURE`.
 
         For methods, ``learnt_from`` registered the training pairs and ``asked_of`` the test pairs; for estimators they
@@ -129,7 +125,7 @@ class Exchange:
             frames += self._by_estimators(registrations, by_estimator, judges)
         return pd.concat(frames, ignore_index=True)
 
-    def _by_methods(self, registrations: Registrations, rivals: Mapping[str, ExplainerEntry]) -> Iterator[pd.DataFrame]:
+    def _by_methods(self, registrations: Registrations, rivals: Mapping[str, ExplainerEntry]) -> Iterator[Frame]:
         splits = {"train": self.settings.train, "test": self.settings.test}
         rows = np.concatenate([first(registrations, *split) for split in splits.items()])
         axes = self.source, self.seed, self.settings.points
@@ -150,7 +146,7 @@ class Exchange:
 
     def _by_estimators(
         self, registrations: Registrations, rivals: Mapping[str, ExplainerEntry], judges: Judges
-    ) -> Iterator[pd.DataFrame]:
+    ) -> Iterator[Frame]:
         train_rows = first(registrations, "train", 2 * self.settings.estimated_train)
         half = len(train_rows) // 2 // len(CONCEPTS) * len(CONCEPTS)  # threes of one object stay together
         test_rows = first(registrations, "test", self.settings.estimated_test)
@@ -192,7 +188,7 @@ def first(registrations: Registrations, split: str, samples: int) -> np.ndarray:
     return np.flatnonzero((registrations.split == split) & (registrations.sample < samples))
 
 
-def labeled(frame: pd.DataFrame, labels: tuple[str, ...], failure_S: np.ndarray) -> pd.DataFrame:
+def labeled(frame: Frame, labels: tuple[str, ...], failure_S: np.ndarray) -> Frame:
     """Columns of a prediction file between `LABELS` and `FAILURE`."""
     for column, (name, label) in enumerate(zip(LABELS, labels, strict=True)):
         frame.insert(column, name, label)

@@ -21,6 +21,7 @@ import numpy as np
 from gpca.classifier.settings import GPCSettings
 from gpca.encoders.registry import EncoderSettings
 from gpca.io.csv_file import write_csv
+from gpca.io.frame import Frame
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.pairs.dataset import Registrations, read_embedding
@@ -30,7 +31,6 @@ from gpca.seeds import generator
 from gpca.settings import Bounds, Distinct, OpenShare
 
 if TYPE_CHECKING:
-    import pandas as pd
     import torch
 
     from gpca.classifier.gpc import GPC
@@ -129,7 +129,7 @@ def deletions(
     seed: int,
     encoding: EncoderSettings,
     settings: GradientSettings,
-) -> pd.DataFrame:
+) -> Frame:
     """Delete points of test samples in every order, and explain what is left with GP-CA.
 
     `DELETION_COLUMNS` by sample, order and share: the score of the concept that is named on the whole draw, before and
@@ -177,9 +177,7 @@ def concept_examples(train: Registrations, concepts: tuple[str, ...]) -> dict[st
     return {name: shown_N for name, shown_N in examples.items() if shown_N.sum() >= FEWEST}
 
 
-def tcav(
-    gpc: GPC, train: Registrations, test: Registrations, settings: GradientSettings, *axes: object
-) -> pd.DataFrame:
+def tcav(gpc: GPC, train: Registrations, test: Registrations, settings: GradientSettings, *axes: object) -> Frame:
     """Test every concept for every class by a GPC that was fitted to the training samples.
 
     Rows of ``tested``, ``concept`` (the class), ``score``, ``chance`` (means over the vectors), ``p`` of the test,

@@ -6,12 +6,9 @@ of a seed are trained on none of the families that they are tested on. Depth fra
 frames' causes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,15 +24,13 @@ from gpca.guarantee.guarantee import states_of
 from gpca.io.container import REGENERATE_BOTH, require_same_samples
 from gpca.io.csv_file import ANY, read_csv
 from gpca.io.files import Axes
+from gpca.io.frame import Frame
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.objects.canonical import BY_ICP
 from gpca.pairs.dataset import Registrations
 from gpca.seeds import generator, seed_of_file
 from gpca.steps.diagnosis import DESCRIBED, with_what_it_reads
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 FRAME_COLUMNS = ("sample", "instance", "truth")
 PARTS = 3  # of families that no file deals into folds
@@ -182,7 +177,7 @@ def _keys(split_N: Iterable, number_N: Iterable) -> list[str]:
     return [f"{split} {number}" for split, number in zip(split_N, number_N, strict=True)]
 
 
-def _predicted(predictions: pd.DataFrame) -> dict[str, np.ndarray]:
+def _predicted(predictions: Frame) -> dict[str, np.ndarray]:
     """Split and number of each sample -> its scores, which are equal where the explainer abstained."""
     scores_N_4 = predictions[list(SCORES)].to_numpy(float)
     scores_N_4 = np.where(predictions["abstained"].to_numpy()[:, None], 1 / len(LABELS), scores_N_4)

@@ -1,9 +1,7 @@
 """Step ``fit_kernel_grid``: the classifier by kernel, learning rate and number of iterations (Table IV)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 
@@ -13,14 +11,12 @@ from gpca.classifier.scores import Attribution
 from gpca.classifier.settings import Draws, GPCSettings, Kernel, LearningRate
 from gpca.errors import InputError
 from gpca.io.csv_file import write_csv
+from gpca.io.frame import Frame
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.settings import Count, Different, Distinct, fields_of
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 MEASURES = ("accuracy", "elbo", "confidence", "ece", "nll")
 SETTING = ("kernel", "learning_rate", "iterations")
@@ -68,9 +64,7 @@ def run(job: Job) -> None:
             write_csv(predictions, prediction_rows)
 
 
-def evaluate_grid(
-    registrations: Registrations, grid: KernelGrid, source: str, seed: int
-) -> tuple[pd.DataFrame, pd.DataFrame]:
+def evaluate_grid(registrations: Registrations, grid: KernelGrid, source: str, seed: int) -> tuple[Frame, Frame]:
     """Rows of :data:`GRID_COLUMNS`, and the predictions of the test samples, which have `SETTING` as first columns.
 
     Each row equals that of a separate fit of that many iterations to the training samples alone. `elbo` is per

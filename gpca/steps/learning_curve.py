@@ -1,10 +1,8 @@
 """Steps ``learning_samples`` and ``learn_from_more``: more labeled samples, and learners of more and more of them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -22,6 +20,7 @@ from gpca.errors import InputError
 from gpca.io.arrays import TEXT
 from gpca.io.container import Container, array
 from gpca.io.csv_file import write_csv
+from gpca.io.frame import Frame
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.objects.canonical import ObjectClouds
@@ -29,9 +28,6 @@ from gpca.pairs.distances import describe_distances
 from gpca.process.progress import progress
 from gpca.seeds import generator, seed_of
 from gpca.settings import Bounds, Count, Distinct, read_settings
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 FEWEST = 20  # training samples of a learner
 GROUPS = ("distances", "planes", "motion", "starts")  # of descriptors, those that need no further registration
@@ -130,7 +126,7 @@ def learn_from_more(job: Job) -> None:
 
 def learning_curve(
     pool: LabeledSamples, tested: LabeledSamples, truth: Causes, settings: CurveSettings, source: str, seed: int
-) -> pd.DataFrame:
+) -> Frame:
     """Row of `CURVE_COLUMNS` for each learner, size and order, and one of the truth from other starts.
 
     An order is a permutation of the pool; a smaller size is part of a larger one in the same order. The tested samples

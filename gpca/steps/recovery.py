@@ -1,13 +1,11 @@
 """Step ``recover``: failures on virtual tables, every policy's recovery from them, and one failure as pictures."""
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +18,7 @@ from gpca.frames.situations import REDRAWS, Shelf, Situation, Situations
 from gpca.io.arrays import save_arrays
 from gpca.io.csv_file import write_csv
 from gpca.io.files import Axes, write_text
+from gpca.io.frame import Frame
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.objects.camera import MeshScene, shade
@@ -48,9 +47,6 @@ from gpca.recovery.rehearsal import (
 from gpca.recovery.settings import LoopSettings, RecoverySettings
 from gpca.rigid import inverse
 from gpca.seeds import generator
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 # Names every random number of this step, tables included. The number is that of the draw: on the tables and cases of
 # draw 1, results were seen between versions of the policies.
@@ -176,7 +172,7 @@ def as_samples(registered: Mapping[str, Iterable[Episode]]) -> Registrations:
     return as_registrations(records)[0]
 
 
-def choose_example(rows: pd.DataFrame) -> int:
+def choose_example(rows: Frame) -> int:
     """The episode that is shown: of overlap, by GP-CA's policy a new view solved it, its score the median.
 
     Where there is none such, the narrower wishes are dropped from the last on.
@@ -193,7 +189,7 @@ def choose_example(rows: pd.DataFrame) -> int:
 def save_example(
     path: str | Path,
     episodes: Sequence[Episode],
-    rows: pd.DataFrame,
+    rows: Frame,
     actions: Mapping[str, Action],
     views: Mapping[str, Any],
     settings: LoopSettings,

@@ -3,14 +3,12 @@
 Local methods start twice: at the pair's initial pose, and at the pose of a global method.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 
@@ -19,6 +17,7 @@ from gpca.alignment.methods.interface import Outcome, Pair
 from gpca.alignment.methods.registry import make_method, method_entry, require_global
 from gpca.errors import InputError
 from gpca.io.csv_file import write_csv
+from gpca.io.frame import Frame
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.objects.canonical import ObjectClouds
@@ -28,9 +27,6 @@ from gpca.pairs.perturbation import SEVERITIES
 from gpca.process.progress import progress
 from gpca.seeds import generator, seed_of
 from gpca.settings import Bounds
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 INITIAL, NO_START = "initial", "none"  # where a registration starts; else, the name of a global method
 SEVERITY_COLUMNS = tuple(f"severity_{name}" for name in SEVERITIES)
@@ -77,7 +73,7 @@ def try_methods(
     seed: int,
     methods: Mapping[str, Mapping],
     settings: PairSettings,
-) -> dict[str, pd.DataFrame]:
+) -> dict[str, Frame]:
     """Return for each method a row per pair and start, with the points that it had; see :func:`try_each`.
 
     The same normals serve all methods of one number of points. Fewer points of a cloud are among more of it.
@@ -130,7 +126,7 @@ def try_each(
     samples: Iterable[int],
     asked: Callable[[int, str], tuple[Pair, dict]],
     errors: Callable[[int, np.ndarray], dict],
-) -> dict[str, pd.DataFrame]:
+) -> dict[str, Frame]:
     """Rows of every sample by method: global methods run once, local ones again from the pose of the one named `start`.
 
     A method that fails has its reason in the row. Each method is called once before the first sample, so that no time
@@ -178,7 +174,7 @@ def timed(method: Callable[[Pair], Outcome], pair: Pair) -> tuple[Outcome, float
     return outcome, perf_counter() - started
 
 
-def write_trials(trials: Iterable[pd.DataFrame], outputs: list[Path], timings: list[Path]) -> None:
+def write_trials(trials: Iterable[Frame], outputs: list[Path], timings: list[Path]) -> None:
     """Write rows of methods, and their seconds in files of their own."""
     for rows, out, seconds in zip(trials, outputs, timings, strict=True):
         write_csv(out, rows.drop(columns="seconds"))

@@ -1,17 +1,15 @@
 """Step ``repair_verdicts``: which poses are accepted, by judges and limits of other families (Table XX)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import logit
 
 from gpca.guarantee.acceptance import accepted_below, accepted_in_hindsight
 from gpca.io.csv_file import write_csv
+from gpca.io.frame import Frame
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.model.diagnoser import threshold_of
@@ -19,9 +17,6 @@ from gpca.model.proposed import with_repair
 from gpca.model.repair import REPAIRED, SEVERAL, decide
 from gpca.model.result import EVEN, Calibrated, ResultJudge
 from gpca.steps.repair import REPAIR, TESTS, Attempts
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 CAUSES, HARD = "causes", "hard"  # tracks whose families judges and limits come from; and that share these
 JUDGED = "judged"  # after a rival's name: its pose is accepted by the judge
@@ -39,7 +34,7 @@ class Limits:
     tests: Mapping[str, tuple[int, float | None]]  # of a rival: the number of its test, or of the judge; its limit
 
 
-def verdicts(attempts: Mapping[str, Sequence[tuple[str, int, Attempts]]], tolerance: float) -> pd.DataFrame:
+def verdicts(attempts: Mapping[str, Sequence[tuple[str, int, Attempts]]], tolerance: float) -> Frame:
     """Return a row for each track, source, seed, sample and method.
 
     Args:

@@ -1,14 +1,12 @@
 """Step ``time_stages``: model, registrations and embeddings -> ``runtime.csv``, the seconds of every stage."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from copy import copy, deepcopy
 from dataclasses import replace
 from functools import partial
 from itertools import chain
 from time import perf_counter
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -22,6 +20,7 @@ from gpca.classifier.latents import Projection
 from gpca.classifier.scores import summarize_draws
 from gpca.evaluation.runtime_file import COMPONENTS, RUNTIME_COLUMNS
 from gpca.io.csv_file import write_csv
+from gpca.io.frame import Frame
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.model.explainer import Explainer
@@ -32,9 +31,6 @@ from gpca.process.processor import cpu_name
 from gpca.process.progress import progress
 from gpca.rigid import transform
 from gpca.seeds import generator
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 WARM_UP = 2  # rounds that do not count: the first calls load compiled functions
 SMALL = 512  # points of the smaller explanation
@@ -66,7 +62,7 @@ def measure(
     repeats: int,
     threads: int,
     *axes: object,
-) -> pd.DataFrame:
+) -> Frame:
     """A row per component and device: mean, standard deviation and median over the repeats, in seconds.
 
     A repeat goes once through all components with the next test registration, so that whatever else the machine does

@@ -3,16 +3,15 @@
 Local methods start from a rung of the ladder, and from the pose of a global method.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 
 from gpca.alignment.methods.interface import Pair
+from gpca.io.frame import Frame
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.process.environment import open3d_cloud, require_open3d
@@ -23,9 +22,6 @@ from gpca.scans.scene import ScanPairs
 from gpca.seeds import generator, seed_of
 from gpca.settings import Bounds, Distinct, fields_of, read_settings
 from gpca.steps.registration_trials import try_each, write_trials
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 NORMAL_VOXELS, NORMAL_NEIGHBORS = 2, 30  # radius and most neighbors, as Open3D's tutorial has them for such scans
 
@@ -59,7 +55,7 @@ def run(job: Job) -> None:
 
 def try_methods(
     pairs: ScanPairs, name: str, seed: int, methods: Mapping[str, Mapping], settings: TrialSettings
-) -> dict[str, pd.DataFrame]:
+) -> dict[str, Frame]:
     """Rows of pairs and starts of the data set `name`, by method; see :func:`try_each`."""
     rungs = rungs_of(len(pairs), settings.ladder, name, seed)
     pair_of = lru_cache(maxsize=1)(pairs.__getitem__)

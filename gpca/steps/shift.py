@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from gpca.explainers.analytical_features import analytical_features
 from gpca.explainers.interface import ConceptExplainer
 from gpca.explainers.registry import Embed, explainer_entry
 from gpca.io.csv_file import write_csv
+from gpca.io.frame import Frame
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.objects.canonical import ObjectClouds, drawn, unseen
@@ -26,10 +27,6 @@ from gpca.pairs.shifted_sets import SPACES, TRAINED_ON, ShiftedSets
 from gpca.pairs.synthesis import RegistrationSettings, make_registrations
 from gpca.process.progress import progress
 from gpca.settings import Bounds, Count, OpenShare
-
-if TYPE_CHECKING:
-    import pandas as pd
-
 
 PRINCIPAL_COMPONENTS = 16  # of embeddings, for their distances
 
@@ -98,7 +95,7 @@ def fit_learners(job: Job) -> None:
                 write_csv(out, predict_sets(make, sets))
 
 
-def predict_sets(make: Callable[[], ConceptExplainer], sets: ShiftedSets) -> pd.DataFrame:
+def predict_sets(make: Callable[[], ConceptExplainer], sets: ShiftedSets) -> Frame:
     """Predictions, after the column ``set``: a new learner learns from the training samples of each encoder."""
     import pandas as pd
 

@@ -1,10 +1,8 @@
 """The table of a track, submitted methods among the published ones, as text and as a page with sortable tables."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +14,7 @@ from gpca.experiments.cause_tables import AGAIN, SHOWN
 from gpca.experiments.frame_causes import FEWEST_FAILURES, STARTS, STATE
 from gpca.experiments.scan_failures import COLUMNS as SCAN_COLUMNS
 from gpca.experiments.scan_failures import NOT_COMPARED
+from gpca.io.frame import Frame
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.tables.builder import TableBuilder
 from gpca.reporting.tables.cells import interval_cell, plain_cell, rows_where
@@ -25,9 +24,6 @@ from gpca.tracks.published import NO_CALLS, Method, Published
 from gpca.tracks.scoring import AGAINST, counts, score
 from gpca.tracks.submission import NO_LINK, Submission, read_submission, track_in_head
 from gpca.tracks.track import CAUSES_TRACK, FRAMES_TRACK, HARD_TRACK, SCANS_TRACK, TRACKS
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 FOLDER = PUBLISHED.parent  # of the submissions
 OURS = {"authors": "this repository"}
@@ -53,9 +49,7 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
 GROUPS = {**STARTS, POOLED: "All together"}  # titles; data sets keep their names
 
 
-def table_of(
-    published: Published, submitted: Mapping[str, Method], scores: pd.DataFrame, against: pd.DataFrame
-) -> Table:
+def table_of(published: Published, submitted: Mapping[str, Method], scores: Frame, against: Frame) -> Table:
     """Return the table of a track with submitted methods, from what :func:`gpca.tracks.scoring.score` returns."""
     track, methods = published.track, {method.name: method for method in published.methods} | dict(submitted)
     columns = dict(COLUMNS[track.name])

@@ -1,24 +1,20 @@
 """The samples of a track as NumPy arrays, a pandas frame, or a torch dataset."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from gpca.causes.dataset import Causes, labels_of
 from gpca.errors import InputError, require_known
 from gpca.io.files import SPLITS
+from gpca.io.frame import Frame
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.tracks.published import NOTHING_NAMED, label_numbers
 from gpca.tracks.samples import TrackSamples
 from gpca.tracks.track import HARD_TRACK, track_of
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 NO_LABEL = NOTHING_NAMED  # of borderline samples, which no measure counts
 
@@ -75,7 +71,7 @@ class TrackData:
         truth = {name: getattr(self, name) for name in ("label", "error", "phi", "causes")}
         return {name: getattr(registrations, name) for name in names} | truth
 
-    def frame(self) -> pd.DataFrame:
+    def frame(self) -> Frame:
         """Return a row per sample with all scalar quantities, and the true φ of each cause."""
         import pandas as pd
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,12 +18,10 @@ from gpca.errors import InputError, refusing
 from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays
 from gpca.io.container import FLAG, Container, array
 from gpca.io.files import require_file, require_memory, whole_file
+from gpca.io.frame import Frame
 from gpca.objects.source import DATA
 from gpca.process.code_files import ROOT
 from gpca.tracks.track import Track
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 FOLDER = ROOT / "results/leaderboard/published"
 NO_CALLS = -1  # unknown number of ICP calls
@@ -89,7 +87,7 @@ def label_numbers(label_N: Iterable[str], labels: Sequence[str]) -> np.ndarray:
     return np.array([numbers.get(label, NOTHING_NAMED) for label in label_N])
 
 
-def predicted(rows: pd.DataFrame, labels: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+def predicted(rows: Frame, labels: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
     """Return the scores (N, C) of rows of a prediction file, and the numbers (N,) of the predicted labels."""
     named_N = np.where(rows["abstained"], "", rows["concept_predicted"].to_numpy(str))
     return rows[[f"score_{label}" for label in labels]].to_numpy(float), label_numbers(named_N, labels)

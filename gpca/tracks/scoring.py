@@ -3,11 +3,8 @@
 All methods are measured on the same samples and the same bootstrap draws.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,12 +16,10 @@ from gpca.evaluation.intervals import Clustered, interval, weighted_mean
 from gpca.evaluation.measures import POOLED
 from gpca.experiments.scan_causes import CAUSES as SCAN_MEASURE
 from gpca.experiments.scan_causes import EVERY, NATURAL, counted_of_scans, scan_measures
+from gpca.io.frame import Frame
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.tracks.published import Method, Published
 from gpca.tracks.track import FRAMES_TRACK, HARD_TRACK, SCANS_TRACK
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 COLUMNS = ("group", "method", "metric", "samples", "seeds", "value", "low", "high")
 AGAINST = ("against", "difference", "difference_low", "difference_high")  # of two methods' headlines
@@ -34,7 +29,7 @@ Arrays = dict[str, np.ndarray]
 Group = tuple[str, np.ndarray, Clustered]
 
 
-def score(published: Published, submitted: Mapping[str, Method]) -> tuple[pd.DataFrame, pd.DataFrame]:
+def score(published: Published, submitted: Mapping[str, Method]) -> tuple[Frame, Frame]:
     """Score the published methods and submitted ones, whose names differ.
 
     Returns `COLUMNS` for each group of samples, method and measure; and group, method and `AGAINST` for each pair of a

@@ -1,12 +1,10 @@
 """Collects what is shipped with a track from a finished run."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -19,15 +17,13 @@ from gpca.experiments.scan_causes import SAMPLE_COLUMNS as SCAN_COLUMNS
 from gpca.explainers.registry import explainer_entry
 from gpca.io.container import require_same_samples
 from gpca.io.csv_file import ANY, numbers, read_csv
+from gpca.io.frame import Frame
 from gpca.jobs.provenance import read_record
 from gpca.objects.canonical import BY_ICP
 from gpca.steps.control_samples import HARD
 from gpca.tracks.published import LIMITS, NO_CALLS, Method, Published, Rows, predicted, sha256_of_arrays
 from gpca.tracks.samples import recipe_of
 from gpca.tracks.track import DEFAULT, FRAMES_TRACK, HARD_TRACK, SCANS_TRACK, Track
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 Part = tuple[str, int]  # source and seed
 Key = tuple[str, str]  # name of an explainer, and its training data if there is a choice
@@ -103,9 +99,9 @@ def _rows(track: Track, run: Path, tested: Mapping[Part, Causes]) -> Rows:
 
 def _predictions(
     track: Track, run: Path, config: Mapping[str, Any], parts: Sequence[Part]
-) -> dict[Key, dict[Part, pd.DataFrame]]:
+) -> dict[Key, dict[Part, Frame]]:
     """Return the predictions of every method for test samples, by part."""
-    predictions: dict[Key, dict[Part, pd.DataFrame]] = {}
+    predictions: dict[Key, dict[Part, Frame]] = {}
     for source, seed in parts:
         if not track.predictions:
             for name in config["diagnosis"]["explainers"]:
@@ -126,7 +122,7 @@ def _predictions(
     return predictions
 
 
-def _method(key: Key, track: Track, config: Mapping[str, Any], parts: list[pd.DataFrame]) -> Method:
+def _method(key: Key, track: Track, config: Mapping[str, Any], parts: list[Frame]) -> Method:
     import pandas as pd
 
     rows = pd.concat(parts)

@@ -1,11 +1,9 @@
 """Estimates of poses' covariances: which registrations they are of, and the files that hold them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, get_args
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 
@@ -13,10 +11,8 @@ from gpca.evaluation.measures import source_method_seed
 from gpca.io.arrays import TEXT, WHOLE
 from gpca.io.container import Container, array
 from gpca.io.csv_file import numbers, read_csv
+from gpca.io.frame import Frame
 from gpca.settings import Bounds, PositiveShare
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 Kind = Literal["starts", "data", "all"]  # of a reference: what varies in it
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -65,7 +61,7 @@ def covariance_columns(covariance_6_6: np.ndarray | None) -> dict[str, float]:
     return dict(zip(COVARIANCE, values.tolist(), strict=True))
 
 
-def read_estimates(path: str | Path) -> pd.DataFrame:
+def read_estimates(path: str | Path) -> Frame:
     """Read a file of the step ``estimate``: `failed` as booleans, numbers as numbers, NaN where an estimate failed."""
     rows = read_csv(path, (*KNOWN, *JUDGED, *COVARIANCE))
     has_estimate = rows["failure"] == ""
@@ -76,7 +72,7 @@ def read_estimates(path: str | Path) -> pd.DataFrame:
     return rows.assign(failed=rows["failed"] == "True")
 
 
-def read_estimate_files(files: Iterable[str | Path]) -> dict[tuple[str, str, int], pd.DataFrame]:
+def read_estimate_files(files: Iterable[str | Path]) -> dict[tuple[str, str, int], Frame]:
     """Rows of files named ``…/{source}/{estimator}/seed{seed}.csv`` by these three."""
     return {source_method_seed(path): read_estimates(path) for path in files}
 

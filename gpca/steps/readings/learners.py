@@ -1,11 +1,8 @@
 """Table V's learners under other readings: kernel, linear SVM, encoder head, diagnostics; and classic features."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import softmax
@@ -20,14 +17,12 @@ from gpca.evaluation.measures import ALL
 from gpca.explainers.analytical_features import analytical_features
 from gpca.explainers.classifiers import PAPERS_RANDOM_STATE
 from gpca.explainers.registry import explainer_entry
+from gpca.io.frame import Frame
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.steps.readings.files import Row, RunFiles, Values, accuracies, table5, train_and_test
 from gpca.steps.readings.gpc_start import gpc_scores
 from gpca.steps.readings.groups import Reading
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 GPC_OF_TABLE_V, FOREST, SVM = "gpca_matern", "learner_forest", "learner_linear_svm"
 # Columns of the features: the residual first, the ratio of the point counts last.
@@ -133,7 +128,7 @@ def diagnostics(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Ro
                 yield reading, source, learner, seed, diagnostics_under(in_set, reading)
 
 
-def diagnostics_under(rows: pd.DataFrame, reading: Reading) -> Values:
+def diagnostics_under(rows: Frame, reading: Reading) -> Values:
     """ρ, the area and ECE of one learner, by the names of their counterparts; entropy stands for BALD.
 
     Without any error, or with errors alone, there is no ROC curve, and no value of it.
