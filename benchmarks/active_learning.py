@@ -9,8 +9,6 @@ label: posterior, BALD, k-means. Retraining is the warm start that the rounds us
 last line is a JSON object: bald_speedup, select_ms, retrain_s, and max_abs_error of BALD in nats.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

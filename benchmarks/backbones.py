@@ -10,8 +10,6 @@ does some training steps, libraries included. The last line is a JSON object: fo
 cloud), parameters_, peak_mb_, and train_speedup_ where there is a plain form.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import subprocess

@@ -8,8 +8,6 @@ registrations, sets the limits on them, and tests these on the others; a promise
 are the limits of the model itself. The last line is a JSON object of the means.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

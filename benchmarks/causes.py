@@ -11,8 +11,6 @@ causes, several (share of the failed), refused (without a truth, or off when cle
 dominant cause, the same; borderline left out).
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

@@ -13,8 +13,6 @@ of the paired difference over seeds and 0.2 points; null if only the longest is 
 
 """
 
-from __future__ import annotations
-
 import argparse
 import csv
 import json

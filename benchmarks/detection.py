@@ -10,8 +10,6 @@ other, with 95 % intervals of a bootstrap over instances. With --objects, clean 
 of one surface, moved by 5° and 2 % of the diameter; an alarm is false. The last line is a JSON object.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

@@ -8,8 +8,6 @@ medians over the pairs. The last line is a JSON object: train_speedup, infer_spe
 embeddings in eval mode).
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

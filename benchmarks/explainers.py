@@ -11,8 +11,6 @@ many calls of Open3D, in turn (A B A B …); the ratio is the median over the pa
 object: icp_speedup, icp_max_abs_error (of a pose), and seconds_<explainer>, icp_share_<explainer>.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

@@ -9,8 +9,6 @@ causal. Numbers are means over the seeds. The last line is a JSON object: per so
 clean_median, clean_95th, and the share of causal samples, of all and of each concept.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

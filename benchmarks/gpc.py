@@ -11,8 +11,6 @@ fit_s, gpytorch_fit_s, fit_speedup, one_sample_ms, ms_200_samples, gpytorch_ms_2
 max_abs_error (of a latent's mean) and max_score_difference.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

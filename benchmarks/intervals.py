@@ -5,8 +5,6 @@ Families of objects differ in their rate of success: a beta distribution whose i
 table, and as its last line one JSON object of numbers.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path
@@ -14,12 +12,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from gpca.evaluation.intervals import (
-    interval,
-    pigeonhole_weights,
-    quantile_bounds,
-    wilson_interval,
-)
+from gpca.evaluation.intervals import interval, pigeonhole_weights, quantile_bounds, wilson_interval
 from gpca.seeds import generator
 
 REPEATS = 100

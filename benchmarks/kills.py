@@ -10,8 +10,6 @@ folder of its own, which is removed if all is well. Status 1 if a start was refu
 The last line is a JSON object: kills, runs, files, differing, left.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

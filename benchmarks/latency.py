@@ -24,8 +24,6 @@ call in a fresh home, and later ones. Of each environment, the last lines are JS
 of both (medians), size and number of its packages.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

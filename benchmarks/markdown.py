@@ -1,7 +1,5 @@
 """Numbers that a command measured, on the page of the documentation that shows them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

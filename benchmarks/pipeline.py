@@ -15,8 +15,6 @@ imports only when it needs it counts as work. --write puts the stages, longest f
 page has for the run. The last line is a JSON object: stages, overhead_share, peak_mb.
 """
 
-from __future__ import annotations
-
 import argparse
 import csv
 import json

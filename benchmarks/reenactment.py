@@ -8,8 +8,6 @@ last line is a JSON object: search_ms, enact_ms (medians of a pair, with all its
 max_abs_error (of its mean log-likelihood at the same pose, nats).
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

@@ -10,8 +10,6 @@ are estimated beforehand and have a row of their own. A method whose package is 
 line is a JSON object: reference_ms, normals_ms, and ms_<method>, ratio_<method>.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

@@ -9,8 +9,6 @@ compared with `posterior` pair by pair; intervals are over families of objects a
 object: success_<candidate>, in %.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

@@ -8,8 +8,6 @@ whose pose is replaced), slowest_ms, registered_ms (the registration alone), pai
 poses, those within 3 % of the diameter).
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

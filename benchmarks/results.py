@@ -10,8 +10,6 @@ good, families, auroc, auroc_clear, false_alarms, missed, covered (by sets of 90
 far_…, and for each name, as NAME_….
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

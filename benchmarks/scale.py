@@ -19,8 +19,6 @@ workflow/measured_times.csv, by which a run tells its time left. The last line i
 critical_s, core_min; and jobs, submitted, core_h, longest_s, results, plan_s, plan_mb.
 """
 
-from __future__ import annotations
-
 import argparse
 import csv
 import json

@@ -7,8 +7,6 @@ Wilson's intervals, and the coefficients that a logistic regression fits to the 
 that it was not fitted to. The last line is a JSON object.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

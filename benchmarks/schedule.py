@@ -1,7 +1,5 @@
 """Jobs of Snakemake's plan on several cores: when the last one ends, and the chain of jobs that no core shortens."""
 
-from __future__ import annotations
-
 import heapq
 from collections import defaultdict
 from collections.abc import Iterable, Mapping

@@ -11,8 +11,6 @@ tables, the model, `paper` and `all` between the two comments that the page has 
 last line is a JSON object of the target `all`.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -7,8 +7,6 @@ Protocols: docs/undetermined.md. The last line is a JSON object: auroc_, named_,
 of false alarms and of found scales.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

@@ -1,7 +1,5 @@
 """Hashes of what fits are made of, to be compared between a processor and an emulated one."""
 
-from __future__ import annotations
-
 import hashlib
 
 import numpy as np

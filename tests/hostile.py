@@ -4,8 +4,6 @@ Each case runs in a process of its own, forked from a server that has loaded the
 them take seconds and one that hangs or swallows all memory harms no other.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import multiprocessing

@@ -6,8 +6,6 @@ than on Intel's. The list was found by comparing some 1,200 calls on an Intel Xe
 estimates are exact; of NumPy's and SciPy's functions none differed.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 

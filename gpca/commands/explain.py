@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from argparse import Action, ArgumentParser, Namespace
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from importlib import import_module
@@ -185,22 +185,15 @@ def run_explain(options: Namespace) -> int:
     for each, arguments in given:
         with its_line(each.source, each.target):
             explain_one(each, arguments)
-    for place, row in _with_progress(rows):
+    from gpca.process.progress import progress
+
+    for place, row in progress(rows, "pairs", unit=" pairs") if rows else ():
         source, target = (options.pairs.parent / (row.get(name) or "") for name in COLUMNS)
         with its_line(source, target, f"{place}: "):
             each = inputs_in(row, options)
             explain_one(each, each.read(read_target))
     print(learned, file=sys.stderr)
     return FAULTY_STATUS if FAULTY_STATUS in statuses else max(statuses)
-
-
-def _with_progress(rows: list[tuple[str, dict[str, str]]]) -> Iterable[tuple[str, dict[str, str]]]:
-    """Show how many pairs are explained, and when all will be."""
-    if not rows:
-        return ()
-    from gpca.process.progress import progress
-
-    return progress(rows, "pairs", unit=" pairs")
 
 
 def _length(text: str, unit: str) -> float:

@@ -55,12 +55,6 @@ class Freedom:
         return self.twists_6_6[:measured][self.deviation_6[:measured] > FREE]
 
 
-def flat_normal(points: np.ndarray) -> np.ndarray | None:
-    """Return the normal (3,) of the plane in which points (N, 3) lie, None where they do not."""
-    variance_3, axes_3_3 = np.linalg.eigh(np.cov(points.T))
-    return axes_3_3[:, 0] if variance_3[0] <= FLAT**2 * variance_3[1] else None
-
-
 class Holder:
     """A model (M, 3) that holds poses; `open_ends`: what lies beyond it may have been there, unseen."""
 
@@ -69,7 +63,8 @@ class Holder:
         distances, near_M_k = tree.query(model, min(NEIGHBORS, len(model) - 1) + 1)
         self.spacing = max(float(np.median(distances[:, 1])), 1e-4)
         around = model[near_M_k[:, 1:]]
-        self.flat = flat_normal(model)
+        variance_3, axes_3_3 = np.linalg.eigh(np.cov(model.T))
+        self.flat = axes_3_3[:, 0] if variance_3[0] <= FLAT**2 * variance_3[1] else None
         if self.flat is not None:
             extents_M_3 = np.linalg.eigvalsh(second_moments(around - around.mean(axis=1, keepdims=True)))
             if np.median(extents_M_3[:, 1]) > OUTLINE**2 * np.median(extents_M_3[:, 2]):

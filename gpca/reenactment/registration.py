@@ -67,7 +67,8 @@ def pose_posterior(
     With a prior, the initial pose is believed in as the settings say; without, it is not read. The search takes `unit`
     for the diameter of the target.
     """
-    frame = Frame(pair, pair.T_target_source_init if prior else _onto_center(pair), unit)
+    onto_center = rigid_motion(np.eye(3), pair.target.mean(axis=0) - pair.source.mean(axis=0))
+    frame = Frame(pair, pair.T_target_source_init if prior else onto_center, unit)
     random = generator("registration", "posterior", pair.seed)
     given = (frame.source, ModelSurface(frame.target))
     if prior:
@@ -79,10 +80,6 @@ def pose_posterior(
             *given, about_center_n, settings, random, lambda T, _width: -log_prior(T, settings)
         )
     return np.stack([frame.pose(hypothesis.T) for hypothesis in hypotheses]), weights_of(hypotheses)
-
-
-def _onto_center(pair: Pair) -> np.ndarray:
-    return rigid_motion(np.eye(3), pair.target.mean(axis=0) - pair.source.mean(axis=0))
 
 
 def align(

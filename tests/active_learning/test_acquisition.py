@@ -3,15 +3,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from gpca.active_learning.acquisition import (
-    EXPANSION,
-    STRATEGIES,
-    Pool,
-    balanced_kmeans,
-    bald_kmeans,
-    select,
-    top,
-)
+from gpca.active_learning.acquisition import EXPANSION, STRATEGIES, Pool, balanced_kmeans, bald_kmeans, select, top
 from gpca.errors import InputError
 
 every_strategy = pytest.mark.parametrize("name", STRATEGIES)

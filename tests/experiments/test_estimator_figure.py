@@ -6,19 +6,9 @@ import pytest
 from scipy.stats import chi2
 
 from gpca.errors import InputError
-from gpca.experiments.estimator_figure import (
-    LEVELS,
-    STYLES,
-    coverages,
-    draw_estimators,
-)
+from gpca.experiments.estimator_figure import LEVELS, STYLES, coverages, draw_estimators
 from gpca.io.csv_file import write_csv
-from gpca.uncertainty.estimates import (
-    JUDGED,
-    REFERENCES,
-    covariance_columns,
-    read_estimate_files,
-)
+from gpca.uncertainty.estimates import JUDGED, REFERENCES, covariance_columns, read_estimate_files
 from gpca.uncertainty.estimators.registry import estimator_entry
 
 from .runs import run_with

@@ -9,14 +9,7 @@ from gpca.errors import InputError
 from gpca.experiments import estimators
 from gpca.experiments.estimators import TRUTH, collect_estimate_seconds, measure, read_intervals, trimmed_mean
 from gpca.io.csv_file import write_csv
-from gpca.uncertainty.estimates import (
-    JUDGED,
-    KINDS,
-    REFERENCES,
-    ReferenceSamples,
-    covariance_columns,
-    read_estimates,
-)
+from gpca.uncertainty.estimates import JUDGED, KINDS, REFERENCES, ReferenceSamples, covariance_columns, read_estimates
 
 from ..steps.test_estimates import covariance_of
 from .runs import run_with

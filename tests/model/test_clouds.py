@@ -94,11 +94,7 @@ SIZES = [
     ((30.0, 0.3), ("m", "m"), "source: looks 100 times larger than the target; .* --source-unit cm --unit m"),
     ((300.0, 250.0), ("m", "m"), "target: its diameter is 250 m, but objects span 1 mm to 10 m; is it in millimeters"),
     ((0.3, 0.25), ("mm", "mm"), "target: its diameter is 0.00025 m, but .*; is it in meters. give --unit m; scans"),
-    (
-        (3e-4, 3.5e-4),
-        ("m", "m"),
-        "target: its diameter is 0.00035 m, but objects span 1 mm .*; scans .*: --scans$",
-    ),
+    ((3e-4, 3.5e-4), ("m", "m"), "target: its diameter is 0.00035 m, but objects span 1 mm .*; scans .*: --scans$"),
     ((5.0, 0.4), ("m", "m"), "source: is 12.5 times as large as the target; give both in the same unit"),
     ((0.0, 0.4), ("m", "m"), "source: is 0 times as large as the target"),
     ((3e4, 2e4), ("m", "m"), "target: .* objects span 1 mm to 10 m; scans of any size: --scans$"),

@@ -60,10 +60,7 @@ def exported(kind):
     data = {
         "binary.ply": lambda: BOX.export(file_type="ply", encoding="binary"),
         "ascii.ply": lambda: ascii_ply(np.asarray(BOX.vertices), np.asarray(BOX.faces)),
-        "quads.ply": lambda: ascii_ply(
-            np.asarray(BOX.vertices),
-            QUADS,
-        ),
+        "quads.ply": lambda: ascii_ply(np.asarray(BOX.vertices), QUADS),
         "plain.obj": lambda: BOX.export(file_type="obj"),
         "binary.stl": lambda: BOX.export(file_type="stl"),
         "ascii.stl": lambda: BOX.export(file_type="stl_ascii"),

@@ -1,7 +1,5 @@
 """Steps and commands called with words, as tests write them: ``["train", "--seed", "0", …]``."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -3,8 +3,6 @@
 The suite itself is not loaded: each copy of the project brings its own.
 """
 
-from __future__ import annotations
-
 import atexit
 import multiprocessing
 import os

@@ -3,16 +3,7 @@
 from importlib import import_module
 
 SNAKEMAKE = ("cli", "profiles", "report.html_reporter", "script", "storage", "workflow")
-SKLEARN = (
-    "calibration",
-    "cluster",
-    "decomposition",
-    "ensemble",
-    "gaussian_process",
-    "linear_model",
-    "pipeline",
-    "svm",
-)
+SKLEARN = ("calibration", "cluster", "decomposition", "ensemble", "gaussian_process", "linear_model", "pipeline", "svm")
 LIBRARIES = (
     *("gpytorch", "jinja2", "matplotlib.pyplot", "nbformat", "numba", "pandas", "PIL.Image", "pydantic"),
     *("SALib.analyze.sobol", "scipy.ndimage", "scipy.optimize", "scipy.spatial.transform", "scipy.stats", "shap"),

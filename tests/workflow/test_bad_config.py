@@ -23,14 +23,8 @@ BAD = {
         lambda project: own_text(project, "seeds: [0]\nseeds: [1]\n"),
         "mine.yaml: line 2: key 'seeds' appears twice; keep one of them",
     ),
-    "bomb": (
-        lambda project: own_text(project, BOMB),
-        "mine.yaml: its aliases expand to more than",
-    ),
-    "template": (
-        lambda project: own_text(project, "__use_yte__: true\nseeds: [0]\n"),
-        "mine.yaml: is a template",
-    ),
+    "bomb": (lambda project: own_text(project, BOMB), "mine.yaml: its aliases expand to more than"),
+    "template": (lambda project: own_text(project, "__use_yte__: true\nseeds: [0]\n"), "mine.yaml: is a template"),
     "folder of the references": (
         lambda project: ("--config", "run=reference"),
         "config key run: results/reference is reserved; choose another name",

@@ -69,10 +69,7 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
         "registrations encoders/ embeddings/ uncertainty/ methods/ estimates/ descriptors/ shifted/ residuals_forest "
         "predictions/ycb/shap_additive predictions/ycb/softmax_head diagnoses/ycb/gate_rmse fig3_concepts",
     ),
-    "gpca/steps/shift.py": (
-        "shifted/ learners/ reliability",
-        "predictions active_learning diagnoses/ model.pt",
-    ),
+    "gpca/steps/shift.py": ("shifted/ learners/ reliability", "predictions active_learning diagnoses/ model.pt"),
     "baselines/heads.py": ("learners/ table5_learners", "shifted/ predictions diagnoses/ kernels"),
     "gpca/experiments/kernel_grid.py": (
         "figures/kernel_learning_curves kernels.csv table4_grid",
@@ -118,18 +115,9 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
     ),
     "gpca/uncertainty/estimators/analytic.py": ("estimates/ exchange/ estimators.csv", "uncertainty/ causes/ methods/"),
     "baselines/descriptors.py": ("diagnoses/ycb/pair_forest table9_causes", "predictions"),
-    "gpca/steps/control_samples.py": (
-        "controls/ control_embeddings/ transfer",
-        "predictions embeddings encoders",
-    ),
-    "gpca/experiments/controls.py": (
-        "controls.csv table10_controls transfer",
-        "controls/ predictions diagnoses/",
-    ),
-    "gpca/uncertainty/estimators/substitute.py": (
-        "exchange/ table14_method_matrix",
-        "estimates/ methods/ predictions",
-    ),
+    "gpca/steps/control_samples.py": ("controls/ control_embeddings/ transfer", "predictions embeddings encoders"),
+    "gpca/experiments/controls.py": ("controls.csv table10_controls transfer", "controls/ predictions diagnoses/"),
+    "gpca/uncertainty/estimators/substitute.py": ("exchange/ table14_method_matrix", "estimates/ methods/ predictions"),
 }
 
 
