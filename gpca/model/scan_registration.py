@@ -246,8 +246,8 @@ class Scans:
         distinct: list[PossiblePose] = []
         for row in (0, *np.argsort(misfits, kind="stable")):
             T, posterior = ends[row], -INDEPENDENT * misfits[row]
-            if row and self.flat and not self._upright(T):
-                continue
+            if row and self.flat and T[:3, :3] @ _axes(self.source)[0] @ _axes(self.target)[0] <= UPRIGHT:
+                continue  # it turns the plane of the scans over
             apart = [displacements((T @ inverse(other))[None], self.common(other))[0] for other, _ in distinct]
             if apart and min(apart) <= same:
                 alike = int(np.argmin(apart))
@@ -277,10 +277,6 @@ class Scans:
                 error_of[causes] = float(capped(errors(inverses(T_n)))[0])
             error_8[b] = error_of[causes]
         return Enactment(hypothesis, candidate, error_8, np.zeros(len(SUBSETS)), errors, 0.0)
-
-    def _upright(self, T: np.ndarray) -> bool:
-        """Whether a pose leaves the plane of flat scans in place, not turned over."""
-        return bool(T[:3, :3] @ _axes(self.source)[0] @ _axes(self.target)[0] > UPRIGHT)
 
     @cached_property
     def flat(self) -> bool:
