@@ -17,7 +17,7 @@ from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import LARGEST_ERROR, SUBSETS, shapley_values
 from gpca.pairs.distances import ObservedPair
 from gpca.reenactment.hypotheses import LAST_ITERATIONS, Hypothesis, find_hypotheses
-from gpca.reenactment.mixture import Mixture
+from gpca.reenactment.mixture import Mixture, densities_of
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface, covered_points, trimmed_square
 from gpca.rigid import inverse, transform
@@ -140,7 +140,8 @@ def completed(surface: ModelSurface, observation: Observation) -> ModelSurface:
 
 def whole_surface(observed: np.ndarray, surface: ModelSurface, T: np.ndarray) -> ModelSurface:
     """Return the surface as observed points (N, 3) at the likeliest pose complete it, by which errors are measured."""
-    fits = Mixture(surface.points, surface.spacing / 2).fit(observed, T[None], LAST_ITERATIONS, moving=False)
+    mixture, densities_N = Mixture(surface.points, surface.spacing / 2), densities_of(observed, surface.points)
+    fits = mixture.fit(observed, T[None], LAST_ITERATIONS, moving=False, densities=densities_N)
     matched_N, lone_N = fits.inlier_n_N[0], fits.lone_n_N[0]
     hypothesis = Hypothesis(
         T, matched_N + lone_N, float(fits.log_likelihood_n[0]), float(fits.width_n[0]), 1, 0, lone_N

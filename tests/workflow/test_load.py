@@ -29,7 +29,8 @@ BESIDE_A_CLONE = "gp-ca-bench/config/smoke.yaml my_parts.yaml"
 SHOWN = ("my_run.yaml", "fewer.yaml", "my_lab.yaml", BESIDE_A_CLONE)  # on a page: test_tasks.py plans them
 CONFIGS = {
     "default": "config/config.yaml", "smoke": "config/smoke.yaml", "full": "config/full.yaml",
-    "stand_ins": "config/stand_ins.yaml", "bop": "config/full.yaml config/bop.yaml",
+    "stand_ins": "config/stand_ins.yaml", "development": "config/development.yaml",
+    "bop": "config/full.yaml config/bop.yaml",
 }  # fmt: skip
 
 
