@@ -133,7 +133,10 @@ def model(job: Job) -> None:
             causes = Causes.load(path)
             reenactments = Reenactments.load(enacted, causes.registrations)
             sets.append(TrainingSet.of(causes, reenactments))
-            errors = pose_errors(causes, ObjectClouds.load(objects_path))
+            objects = ObjectClouds.load(
+                objects_path, causes.registrations.axes[0] if causes.registrations.axes else None
+            )
+            errors = pose_errors(causes, objects)
             proposals.append(proposed_for_all(causes, reenactments, errors, truth.icp, truth.moved))
         diagnoser, bald_N = learn(
             TrainingSet.joined(sets),

@@ -144,7 +144,10 @@ def test_datasets_without_any_model_that_can_stand_are_refused(scenes, tmp_path,
     ("given", "expected"),
     [
         ({"datasets": {"tiny": {"location": "/nowhere/at/all"}}}, "/nowhere/at/all does not exist"),
-        ({"datasets": {"tiny": {"location": "/usr", "results": "/lost.csv"}}}, "/lost.csv: no such results file; correct"),
+        (
+            {"datasets": {"tiny": {"location": "/usr", "results": "/lost.csv"}}},
+            "/lost.csv: no such results file; correct",
+        ),
     ],
 )
 def test_a_faulty_call_ends_in_one_line(read, capsys, given, expected):

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -53,7 +54,9 @@ def unlabelled(path):
 
 @pytest.mark.parametrize(("step", "option", "name"), [*given_files()])
 def test_a_file_of_another_source_or_seed_is_refused(folder, capsys, step, option, name):
-    own = "another" + name  # under a name of its own, so that the step's other options still give the right file
+    own = str(
+        Path(name).with_name("another" + Path(name).name)
+    )  # under a name of its own, so that the step's other options still give the right file
     (folder / own).write_bytes((folder / name).read_bytes())
     relabeled(folder / own, *ELSEWHERE)
     changes = {own: [], option: None} if option == name else {option: own}

@@ -20,6 +20,7 @@ ELSEWHERE = {
     *("retrain", "join_repeats", "measure_joint", "choose_joint", "apply_joint"),
     *("scan_causes", "diagnose_scans"),
     *("check-config", "check-reference", "bench", "score", "leaderboard", "compare", "ship-predictions"),
+    *("repair", "calibrate"),
 }
 BY_HAND = {"labels.csv", "answers.txt"}  # given by a person, not made
 

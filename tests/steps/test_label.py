@@ -72,7 +72,7 @@ FAULTS = [
     (removed("embeddings.npz"), {}, r"embeddings.npz: no such file; make it with Snakemake"),
     (untouched, {"--embeddings": None}, r"--embeddings: is missing; name the embeddings of the registrations"),
     (untouched, {"--out": "out.pt"}, r"--out: is for the queue of an explanation alone"),
-    (removed("answers.txt"), {}, r"answers.txt: no such file; give a text file with one answer per line"),
+    (removed("answers.txt"), {}, r"answers.txt: no such file; give a text file in UTF-8 with one answer per line"),
     (untouched, {"--known": ["noise"]}, r"starts with fewer than two labeled concepts; name two with --known"),
     (untouched, {"--strategy": "best"}, r"strategy 'best': unknown; choose one of random"),
     (written("labels.csv", "sample,split\n1,train\n"), {}, r"labels.csv: column 'concept' is missing"),
