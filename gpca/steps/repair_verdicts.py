@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from scipy.special import logit
@@ -16,6 +15,7 @@ from gpca.model.diagnoser import threshold_of
 from gpca.model.proposed import with_repair
 from gpca.model.repair import REPAIRED, SEVERAL, decide
 from gpca.model.result import EVEN, Calibrated, ResultJudge
+from gpca.seeds import seed_of_file
 from gpca.steps.repair import REPAIR, TESTS, Attempts
 
 CAUSES, HARD = "causes", "hard"  # tracks whose families judges and limits come from; and that share these
@@ -119,12 +119,9 @@ def log_odds(probability: float) -> float:
 
 def run(job: Job) -> None:
     """Decide on the attempts of all tracks -> ``repairs/verdicts.csv``."""
-    files: dict[str, list[Path]] = {}
-    for path in job.attempts:
-        files.setdefault(path.parts[-3], []).append(path)
     with record_provenance([job.verdicts], job.attempts, job.settings):
-        attempts = {
-            track: [(path.parent.name, int(path.stem.removeprefix("seed")), Attempts.load(path)) for path in paths]
-            for track, paths in files.items()
-        }
+        attempts: dict[str, list[tuple[str, int, Attempts]]] = {}
+        for path in job.attempts:
+            axes = path.parent.name, seed_of_file(path)
+            attempts.setdefault(path.parts[-3], []).append((*axes, Attempts.load(path, axes)))
         write_csv(job.verdicts, verdicts(attempts, job.settings["tolerance"]), form="%.9g")

@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -54,9 +53,8 @@ def unlabelled(path):
 
 @pytest.mark.parametrize(("step", "option", "name"), [*given_files()])
 def test_a_file_of_another_source_or_seed_is_refused(folder, capsys, step, option, name):
-    own = str(
-        Path(name).with_name("another" + Path(name).name)
-    )  # under a name of its own, so that the step's other options still give the right file
+    own = f"another/{name}"  # of another place, so that the step's other options still give the right file
+    (folder / own).parent.mkdir(parents=True)
     (folder / own).write_bytes((folder / name).read_bytes())
     relabeled(folder / own, *ELSEWHERE)
     changes = {own: [], option: None} if option == name else {option: own}
