@@ -113,7 +113,7 @@ def test_the_command_runs_anywhere(installed, tmp_path):
     assert run("--help").stdout.startswith("usage: gpca ")
     missing = run("explain", "a.ply", "b.ply")
     assert missing.returncode == 2
-    lost = "a.ply: no such file" if SHIPPED.is_file() else f"no model: none in {tmp_path}/results; "
+    lost = "b.ply: no such file" if SHIPPED.is_file() else f"no model: none in {tmp_path}/results; "
     assert missing.stderr.startswith(f"gpca explain: {lost}")
     (tmp_path / "run").mkdir()
     missing = run("check-reference", "run")
