@@ -65,10 +65,11 @@ def add_label_arguments(parser: ArgumentParser) -> None:
 def run_label(options: Namespace) -> None:
     settings = read_settings(GPCSettings, {"learning_rate": 0.2, "iterations": 150} | options.settings)
     require_file(options.registrations, "no such file", "make it with Snakemake, or by 'gpca explain --queue'")
-    if not zipfile.is_zipfile(options.registrations):
-        raise InputError(options.registrations, "is damaged, or not an npz archive", "make it again")
-    queued = is_queue(options.registrations)
+    whole = zipfile.is_zipfile(options.registrations)
+    queued = whole and is_queue(options.registrations)
     require_apart(options, ["labels", "picture", "predictions", "out"], [model_path(options.model)] if queued else [])
+    if not whole:
+        raise InputError(options.registrations, "is damaged, or not an npz archive", "make it again")
     place = "is not for the queue of an explanation" if queued else "is for the queue of an explanation alone"
     for name in ("embeddings", "predictions") if queued else ("model", "out"):
         if getattr(options, name):
