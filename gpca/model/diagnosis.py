@@ -316,7 +316,8 @@ class Diagnosis:
         """The causes, or that nothing is wrong; and what to be aware of."""
         if named := " and ".join(self.named):
             return named
-        return f"nothing is wrong, but {caveat}" if (caveat := self.reenacted.caveat) else "nothing is wrong"
+        nothing = "no failure is shown" if self.doubtful else "nothing is wrong"
+        return f"{nothing}, but {caveat}" if (caveat := self.reenacted.caveat) else nothing
 
     @property
     def doubtful(self) -> bool:
@@ -329,9 +330,8 @@ class Diagnosis:
         """What to know of a result that is right."""
         if self.start < self.start_threshold:
             return self.statement
-        return (
-            "this result is right, but registrations from such starts often fail: start closer or search more broadly"
-        )
+        right = f"this result is {'probably ' * self.doubtful}right"
+        return f"{right}, but registrations from such starts often fail: start closer or search more broadly"
 
     @property
     def named(self) -> tuple[str, ...]:
@@ -363,9 +363,11 @@ class Diagnosis:
     def lines(self, unit: str) -> list[str]:
         """Lines of text, with lengths in this unit."""
         limit = f"{in_decimals(self.tolerance)} {unit} ({100 * self.tolerance_share:.2g} % of the diameter)"
+        odd = (self.result >= LIKELY) != (self.result >= self.threshold)  # as few good ones are to be called failed
+        called = f"; only from {self.threshold:.2f} on is it called failed" * (odd and self.threshold <= 1)
         return [
             f"state     {'probably ' * self.doubtful}{self.state}: {self.statement}",
-            f"result    probability {self.result:.2f} that the pose is off by more than {limit}",
+            f"result    probability {self.result:.2f} that the pose is off by more than {limit}{called}",
             f"start     registrations from such starts fail with probability {self.start:.2f}",
             *(self.guarantee.lines() if self.guarantee else ["set       none, since nothing is promised"]),
             f"causes    {', '.join(f'{cause} {share:.3f}' for cause, share in self.causes.items())}, if it failed",

@@ -19,7 +19,8 @@ def require_model(path: str | Path) -> None:
 def model_path(chosen: str | Path | None = None, results: Path = RESULTS) -> Path:
     """Return the path to use: the given one, that of the environment, a model of the workflow, or `SHIPPED`.
 
-    Among the runs in `results`, ``full`` comes first, then ``default``, then the newest other run, and ``smoke`` last.
+    Among the runs in `results`, ``full`` comes first, then ``default``, then the newest other run. ``smoke``, which is
+    too small to trust, is the last resort, after `SHIPPED`.
     """
     if chosen is not None:
         return Path(chosen)
@@ -30,9 +31,11 @@ def model_path(chosen: str | Path | None = None, results: Path = RESULTS) -> Pat
 
     def rank(path: Path) -> tuple:
         run = path.parent.name
-        return run == "smoke", run != "full", run != "default", -path.stat().st_mtime
+        return run != "full", run != "default", -path.stat().st_mtime
 
-    candidates = [*sorted(results.glob("*/model.pt"), key=rank), *([SHIPPED] if SHIPPED.is_file() else [])]
+    smoke = results / "smoke/model.pt"
+    runs = sorted(set(results.glob("*/model.pt")) - {smoke}, key=rank)
+    candidates = [*runs, *filter(Path.is_file, [SHIPPED, smoke])]
     if not candidates:
         remedy = f"{REMEDY}, or name one with --model or {VARIABLE}"
         raise InputError("no model", f"none in {results.absolute()}", remedy)

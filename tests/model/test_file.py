@@ -154,11 +154,11 @@ def test_the_best_model_of_the_workflow_is_taken(tmp_path, none_shipped):
         (tmp_path / run).mkdir()
         (tmp_path / run / "model.pt").touch()
         os.utime(tmp_path / run / "model.pt", (1000 + (run == "mine"), 1000 + (run == "mine")))
-    (tmp_path / "shipped.pt").touch()  # that of the package is taken where the workflow made none
-    for run in ("full", "default", "mine", "older", "smoke"):
-        assert model_path(results=tmp_path) == tmp_path / run / "model.pt"
-        (tmp_path / run / "model.pt").unlink()
-    assert model_path(results=tmp_path) == tmp_path / "shipped.pt"
+    (tmp_path / "shipped.pt").touch()  # that of the package is taken where the workflow made none but the smallest
+    runs = [f"{run}/model.pt" for run in ("full", "default", "mine", "older")]
+    for name in (*runs, "shipped.pt", "smoke/model.pt"):
+        assert model_path(results=tmp_path) == tmp_path / name
+        (tmp_path / name).unlink()
 
 
 def test_a_named_model_comes_before_those_below_the_working_directory(tmp_path, none_shipped, monkeypatch):
