@@ -9,7 +9,7 @@ from gpca.attribution.predictions import read_predictions
 from gpca.causes.candidate import replay
 from gpca.causes.dataset import LABELS, Causes
 from gpca.causes.settings import CauseSettings
-from gpca.causes.truth import ALL, BY_SIZE, FAILED, SUBSETS
+from gpca.causes.truth import ALL, BY_SIZE, FAILED, SUBSETS, shapley_values
 from gpca.declarations.result import Figure, Paths
 from gpca.errors import InputError
 from gpca.evaluation.measures import source_method_seed
@@ -17,17 +17,17 @@ from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.perturbation import CONCEPTS, NOISE, OVERLAP
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reporting.figures import style
-from gpca.reporting.figures.cloud_views import draw_clouds, legend_of_clouds, widest_views
+from gpca.reporting.figures.cloud_views import widest_views
 from gpca.reporting.figures.panels import color_on_blue, write_below
-from gpca.reporting.figures.style import SMALL_PT, TEXT_WIDTH_IN, blues, use_style, write_title
+from gpca.reporting.figures.solid import NEUTRAL, Solid
+from gpca.reporting.figures.style import CONCEPT_COLORS, SMALL_PT, TEXT_WIDTH_IN, blues, use_style, write_title
 from gpca.reporting.words import object_in_words
 from gpca.rigid import transform
 from gpca.seeds import seed_of_file
 
-PANEL_IN = 1.3
-PANELS_IN = 3.0  # of the eight counterfactuals, two in each of four rows
-HEAD_IN = 0.3
-CAPTION_IN = 0.17
+HEAD_IN, SOLID_IN = 0.3, 2.1
+PIXELS = 640  # of a solid, on each side
+CUT, MARGIN = 0.01, 0.03  # share of observed points that lie outside, and diameters around all others
 TRUTH = "measured share φ"
 ROW_IN = 0.19
 CLEAR = 0.6  # share of the largest φ in the sum of all from which a cause is clear
@@ -44,34 +44,77 @@ def draw_causes_example(
     title: str,
     dataset: str = "",
 ) -> Figure:
-    """Draw the counterfactuals on the left, and on the right the measured shares and the scores of every explainer.
+    """Draw the registration with all causes, without the one that does most and without any; below these, what each
+    cause adds to the error v, and the scores of the explainers.
 
-    Left is the observed cloud over the model after ICP with every subset of the causes, and the error v of each.
     The sample is a usual case with a clear cause, whoever is right about it: a failure of several causes whose largest
     φ is at least 0.6 of the sum of all. The paths name the shown source and seed.
     """
     causes = Causes.load(causes_npz)
     row = usual_failure(causes, causes_npz, is_clear(causes))
     source, seed = Path(causes_npz).parent.name, seed_of_file(causes_npz)
-    model, observed_8 = replay(ObjectClouds.load(objects_npz), causes, row, source, seed, settings)
+    objects = ObjectClouds.load(objects_npz)
+    _, observed_8 = replay(objects, causes, row, source, seed, settings)
     names, scores_R_4, verdicts = _scores(causes, row, predictions_csv, explainers)
-    rows_in = 0.35 + ROW_IN * (len(names) + GAP)
-    height_in = HEAD_IN + max(4 * (0.75 * PANEL_IN + CAPTION_IN), rows_in)
-    figure = use_style().figure(figsize=(TEXT_WIDTH_IN, height_in), layout="constrained")
-    left, right = figure.subfigures(1, 2, width_ratios=(PANELS_IN, TEXT_WIDTH_IN - PANELS_IN))
-    view = widest_views(model)[0]
-    clouds = {
-        f"{words}: {100 * causes.truth.error[row, subset]:.1f} %": observed_8[subset] for subset, words in WORDS.items()
-    }
-    _draw_clouds(left.subplots(4, 2), model, clouds, view, size=0.9, cut=0.001)
-    table, spare = right.subplots(2, 1, height_ratios=(rows_in, max(height_in - HEAD_IN - rows_in, 0.01)))
-    spare.set_axis_off()
-    _draw_scores(table, names, scores_R_4, verdicts)
-    object_name = object_in_words(causes.registrations.object_name[row], dataset)
+    below_in = 0.35 + ROW_IN * max(len(names) + GAP, 5)
+    figure = use_style().figure(figsize=(TEXT_WIDTH_IN, HEAD_IN + SOLID_IN + below_in), layout="constrained")
+    above, below = figure.subfigures(2, 1, height_ratios=(SOLID_IN + HEAD_IN / 2, below_in + HEAD_IN / 2))
+    error_8 = causes.truth.error[row]
+    most = int(np.argmax(causes.truth.phi[row]))
+    kept = SUBSETS.index(tuple(cause for cause in range(len(CONCEPTS)) if cause != most))
+    stages = {"with all three causes": ALL, f"without {CONCEPTS[most]}": kept, "without any": SUBSETS.index(())}
+    clouds = {f"{words}: {100 * error_8[subset]:.1f} %": observed_8[subset] for words, subset in stages.items()}
+    _draw_over_solid(above.subplots(1, len(clouds)), objects, causes, row, clouds, size=2.5)
+    left, right = below.subfigures(1, 2, width_ratios=(0.42, 0.58))
+    _draw_waterfall(left.subplots(), error_8[SUBSETS.index(())], causes.truth.phi[row])
+    _draw_scores(right.subplots(), names, scores_R_4, verdicts)
     shown_error = f"{100 * causes.error_shown[row]:.1f} %"
-    write_title(figure, f"{title}: {object_name}. Errors relative to the diameter; registration shown: {shown_error}")
-    legend_of_clouds(figure, "model", "observed", gap=0.2)
+    object_name = object_in_words(causes.registrations.object_name[row], dataset)
+    write_title(figure, f"{title}: {object_name}. The registration shown to the explainers is off by {shown_error}")
     return figure
+
+
+def _draw_over_solid(
+    panels: np.ndarray,
+    objects: ObjectClouds,
+    causes: Causes,
+    row: int,
+    clouds: Mapping[str, np.ndarray],
+    size: float,
+) -> None:
+    """Draw the model of a sample as a shaded solid and clouds over it, each with its name below, at one scale."""
+    index = objects.names.index(causes.registrations.object_name[row])
+    points, normals = (part.astype(float) for part in objects.clouds[index])
+    points = points / objects.diameters_m[index]
+    axes = widest_views(points)[0]
+    solid = Solid.of(points, normals, axes, PIXELS, NEUTRAL)
+    seen = np.concatenate([cloud @ axes[:2].T for cloud in clouds.values()])
+    outer = np.concatenate([points @ axes[:2].T, np.quantile(seen, (CUT, 1 - CUT), axis=0)])
+    corners_2_2 = np.stack([outer.min(axis=0), outer.max(axis=0)], axis=1) + MARGIN * np.array([-1, 1])
+    for panel, (name, cloud) in zip(panels.flat, clouds.items(), strict=False):
+        solid.draw(panel, cloud, size, corners_2_2)
+        write_below(panel, name, fontsize=SMALL_PT)
+    for spare in panels.flat[len(clouds) :]:
+        spare.set_axis_off()
+
+
+def _draw_waterfall(panel, error: float, phi_3: np.ndarray) -> None:
+    """Draw an error without causes and what each cause adds to it, its Shapley value: bars that end at the sum."""
+    order = [int(cause) for cause in np.argsort(phi_3, kind="stable")]
+    ends = 100 * np.cumsum([error, *phi_3[order]])
+    bars = [("without causes", 0.0, ends[0], style.LIGHT_GRAY)]
+    bars += [(CONCEPTS[c], ends[k], ends[k + 1] - ends[k], CONCEPT_COLORS[CONCEPTS[c]]) for k, c in enumerate(order)]
+    bars += [("all three", 0.0, ends[-1], style.LIGHT_GRAY)]
+    words, start, width, colors = zip(*bars, strict=True)
+    panel.barh(range(len(bars)), width, left=start, color=colors, height=0.7)
+    for place, (_, left, wide, _) in enumerate(bars):
+        sign = "+" if 0 < place < len(bars) - 1 and wide >= 0 else ""
+        panel.text(max(left, left + wide), place, f" {sign}{wide:.1f}", va="center_baseline", fontsize=SMALL_PT)
+    panel.set_yticks(range(len(bars)), words, fontsize=SMALL_PT)
+    panel.invert_yaxis()
+    panel.set_xlim(min(0.0, *start), 1.18 * max(ends))
+    panel.set_xlabel("mean error over the starts (% of the diameter)", fontsize=SMALL_PT)
+    panel.tick_params(axis="y", length=0)
 
 
 def usual_failure(causes: Causes, path: str | Path, asked_S: np.ndarray) -> int:
@@ -139,15 +182,14 @@ def _draw_scores(panel, names: list[str], scores_R_4: np.ndarray, verdicts: Sequ
     panel.tick_params(length=0, pad=2, labeltop=True, labelbottom=False)
 
 
-PER_ROW = 4
-CLOUD_IN, WORDS_IN, CAPTION_BELOW_IN, ERRORS_IN = 0.85, 0.17, 0.15, 2.1
-CLOUDS = {"as observed": (NOISE, OVERLAP), "without noise": (OVERLAP,), "completed": (NOISE,), "both": ()}
+SOLIDS_IN, CAPTION_IN, ERRORS_IN = 1.15, 0.36, 1.55
 LOOKS = ((style.BLUE, "o"), (style.VERMILION, "s"), (style.GREEN, "^"), (style.PURPLE, "D"))  # of the hypotheses
 LEAST_AREA, MOST_AREA = 6.0, 34.0  # points², of the marks of an improbable and of a certain hypothesis
 AGREE = 1e-6  # diameters; numbers of a file and of the same re-enactment made again
 
 
 def draw_reenactment(
+    objects_npz: str | Path,
     causes_npz: str | Path,
     reenactments_npz: str | Path,
     truth: CauseSettings,
@@ -155,8 +197,8 @@ def draw_reenactment(
     title: str,
     dataset: str = "",
 ) -> Figure:
-    """Draw above the observed cloud where each hypothesis puts it in the model, with its probability; below these the
-    clouds that the first hypothesis rebuilds; and the errors of all eight registrations, measured and re-enacted.
+    """Draw in one strip the result of ICP, the likeliest pose and the clouds that are rebuilt there; and below it the
+    errors of all eight registrations, measured and re-enacted, with the verdict.
 
     The sample is a usual case in doubt: a failure of several causes that has more than one hypothesis. The paths name
     the shown source and seed.
@@ -177,46 +219,24 @@ def draw_reenactment(
         fault = f"has other errors of sample {enacted.sample[row]} than these settings give"
         raise InputError(reenactments_npz, fault, "regenerate it from a single config")
 
-    rows_in = WORDS_IN + CLOUD_IN + CAPTION_BELOW_IN
-    figure = use_style().figure(
-        figsize=(style.COLUMN_WIDTH_IN, WORDS_IN + 2 * rows_in + ERRORS_IN), layout="constrained"
-    )
-    above, between, below = figure.subfigures(3, 1, height_ratios=(rows_in, rows_in, ERRORS_IN))
-    view = widest_views(pair.model)[0]
-    before = transform(pair.T_init, pair.observed)
-    placed = {
-        f"{k + 1}: {100 * weight:.0f} %": transform(enactment.hypothesis.T, before)
-        for k, (enactment, weight) in enumerate(zip(again, weight_K, strict=True))
-    }
-    rebuilt = again[0].candidate
+    first, rebuilt = again[0].hypothesis, again[0].candidate
+    applied = rebuilt.present
     clouds = {
-        name: rebuilt.observed(tuple(cause for cause in present if rebuilt.applied[cause]))
-        for name, present in CLOUDS.items()
+        "after ICP": pair.observed,
+        f"likeliest pose: {100 * weight_K[0]:.0f} %": transform(first.T, transform(pair.T_init, pair.observed)),
+        "there, without noise": rebuilt.observed(tuple(cause for cause in applied if cause != NOISE)),
+        "there, completed": rebuilt.observed(tuple(cause for cause in applied if cause != OVERLAP)),
     }
-    for part, words, shown in (
-        (above, "Hypotheses of the true pose, and how probable each is", placed),
-        (between, "Clouds rebuilt under hypothesis 1", clouds),
-    ):
-        part.suptitle(words, x=0.005, ha="left", fontsize=SMALL_PT)
-        _draw_clouds(part.subplots(1, PER_ROW), pair.model, shown, view, size=0.6, cut=0.005)
+    strip_in = HEAD_IN + SOLIDS_IN + CAPTION_IN
+    figure = use_style().figure(figsize=(TEXT_WIDTH_IN, strip_in + ERRORS_IN), layout="constrained")
+    above, below = figure.subfigures(2, 1, height_ratios=(strip_in, ERRORS_IN))
+    _draw_over_solid(above.subplots(1, len(clouds)), ObjectClouds.load(objects_npz), causes, row, clouds, size=1.5)
     _draw_errors(below.subplots(), causes.truth.error[row], errors_K_8, weight_K)
-    below.suptitle("Mean error over the starts, with these causes", x=0.005, ha="left", fontsize=SMALL_PT)
-    write_title(figure, f"{title}: {object_in_words(causes.registrations.object_name[row], dataset)}")
-    legend_of_clouds(figure, "model", "observed", gap=0.2)
+    phi_3 = shapley_values((weight_K[:, None] * errors_K_8).sum(axis=0)[None])[0]
+    named, true = CONCEPTS[int(np.argmax(phi_3))], causes.truth.dominant[row]
+    verdict = f"It names {named}" + (", as measured" if named == true else f"; measured is {true}")
+    write_title(figure, f"{title}: {object_in_words(causes.registrations.object_name[row], dataset)}. {verdict}")
     return figure
-
-
-def _draw_clouds(
-    panels: np.ndarray, model: np.ndarray, clouds: Mapping[str, np.ndarray], view: np.ndarray, size: float, cut: float
-) -> None:
-    """Draw clouds over the model, each with its name below; all have one scale, and a share far off is cut."""
-    seen = {name: cloud @ view.T for name, cloud in clouds.items()}
-    corners = np.quantile(np.concatenate([model @ view.T, *seen.values()]), (cut, 1 - cut), axis=0)
-    for panel, name in zip(panels.flat, [*seen, *[""] * (panels.size - len(seen))], strict=True):
-        panel.set_axis_off()
-        if name:
-            draw_clouds(panel, model @ view.T, seen[name], size=size, corners=corners)
-            write_below(panel, name, fontsize=SMALL_PT)
 
 
 def _draw_errors(panel, true_8: np.ndarray, error_K_8: np.ndarray, weight_K: np.ndarray) -> None:
@@ -236,5 +256,5 @@ def _draw_errors(panel, true_8: np.ndarray, error_K_8: np.ndarray, weight_K: np.
     panel.set_xlim(left=0)
     panel.xaxis.set_major_locator(MaxNLocator("auto", prune="upper"))  # else the last number may reach over the edge
     panel.tick_params(axis="y", length=0)
-    panel.set_xlabel("error (% of the diameter)")
+    panel.set_xlabel("mean error over the starts with these causes (% of the diameter)")
     panel.legend(loc="best", handletextpad=0.3, borderaxespad=0.2)

@@ -72,10 +72,12 @@ def counts_and_calls(costs: Mapping[str, Mapping]) -> Callable[[Row, Frame], dic
 @figure(
     SECTION,
     "One failed registration and its counterfactuals",
-    """A failed registration of a test object, registered again with every subset of its causes from the same starts.
-    The errors give each cause its exact share φ in the failure, its Shapley value. On the right are these shares
-    and below them the scores of every explainer, which saw only the registration with all causes; the largest of
-    each row is bold. Scores are no shares: those of a multi-label explainer need not add up to 1.
+    """A failed registration of a test object, registered again with every subset of its causes from the same starts:
+    three of these, with the mean error over the starts. All eight errors give each cause what it added, its Shapley
+    value φ (below, left), and its share in the failure (right, first row). Below that are the scores of some
+    explainers, which saw only the registration with all causes; the largest of each row is bold. Scores are no
+    shares: those of a multi-label explainer need not add up to 1. Observed points are blue, and pale where the model
+    hides them.
 
     Shown is a usual case with a clear cause: of the failed test samples with several causes whose largest φ is at
     least 0.6 of the sum, the one whose margin over the next φ is the median. The last column says who names the
@@ -89,7 +91,9 @@ def causes_example(run: Run, objects_npz, causes_npz, predictions_csv):
     source = run.config["figures"]["source"]
     truth = CauseSettings.from_dict(dict(run.config["causes"]), dict(run.config["registrations"]["icp"]))
     shown = run.source_titles[source], dataset_of(run.config["sources"][source])
-    return draw_causes_example(objects_npz, causes_npz, predictions_csv, truth, cause_titles(run.config), *shown)
+    titles = cause_titles(run.config)
+    some = {name: titles[name] for name in (*COMPARED, "rule") if name in titles} or titles
+    return draw_causes_example(objects_npz, causes_npz, predictions_csv, truth, some, *shown)
 
 
 @table(

@@ -79,20 +79,22 @@ def in_words(name: str) -> str:
 @figure(
     SECTION,
     "One failed registration, re-enacted by an observer",
-    """Above, the observed cloud where each hypothesis of the true pose puts it in the model, with its probability. In
-    the middle, the clouds that the first hypothesis rebuilds. Below, the mean error of registrations with each subset
-    of the causes: measured, with the truth (bars), and re-enacted under each hypothesis (marks, the larger the more
-    probable). Shown is the failed test sample of median margin with several causes and several hypotheses.""",
+    """Above, what ICP made of the observed cloud, where the likeliest hypothesis of the true pose puts it in the model,
+    with its probability, and the clouds that are rebuilt there. Below, the mean error of registrations with each
+    subset of the causes: measured, with the truth (bars), and re-enacted under each hypothesis (marks, the larger the
+    more probable). The title says which cause these errors name. Shown is the failed test sample of median margin
+    with several causes and several hypotheses.""",
     after="causes_example",
+    objects_npz="objects/{shown_source}.npz",
     causes_npz="causes/{shown_source}/seed{first_seed}.npz",
     reenactments_npz="reenactments/{shown_source}/seed{first_seed}.npz",
 )
-def reenactment(run: Run, causes_npz, reenactments_npz):
+def reenactment(run: Run, objects_npz, causes_npz, reenactments_npz):
     source = run.config["figures"]["source"]
     truth = CauseSettings.from_dict(dict(run.config["causes"]), dict(run.config["registrations"]["icp"]))
     settings = read_settings(ReenactmentSettings, dict(run.config["diagnosis"]["reenactment"]))
     shown = run.source_titles[source], dataset_of(run.config["sources"][source])
-    return draw_reenactment(causes_npz, reenactments_npz, truth, settings, *shown)
+    return draw_reenactment(objects_npz, causes_npz, reenactments_npz, truth, settings, *shown)
 
 
 @table(

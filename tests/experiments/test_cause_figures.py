@@ -3,9 +3,18 @@ import pytest
 
 from gpca.causes.candidate import replay
 from gpca.causes.settings import CauseSettings
-from gpca.causes.truth import ALL, FAILED
+from gpca.causes.truth import ALL, FAILED, SUBSETS
 from gpca.errors import InputError
-from gpca.experiments.cause_figures import CLEAR, GAP, TRUTH, _draw_scores, draw_causes_example, is_clear, usual_failure
+from gpca.experiments.cause_figures import (
+    CLEAR,
+    GAP,
+    TRUTH,
+    _draw_scores,
+    _draw_waterfall,
+    draw_causes_example,
+    is_clear,
+    usual_failure,
+)
 from gpca.objects.canonical import write_objects
 from gpca.objects.procedural import surfaces
 from tests.conftest import FEW_CAUSES, FOUR
@@ -45,6 +54,21 @@ def test_what_was_measured_stands_apart_from_the_scores_and_the_largest_of_a_row
     assert panel.get_yticks().tolist() == [0, 1 + GAP, 2 + GAP]
     bold = {text.get_text() for text in panel.texts if text.get_fontweight() == "bold"}
     assert bold == {"0.50", "0.90", "0.70", "", "tie"}
+    plt.close(figure)
+
+
+def test_the_bars_of_a_waterfall_begin_where_others_end_and_add_up(causes):
+    import matplotlib.pyplot as plt
+
+    figure, panel = plt.subplots()
+    row = usual_failure(causes, "causes.npz", is_clear(causes))
+    error_8, phi_3 = causes.truth.error[row], causes.truth.phi[row]
+    _draw_waterfall(panel, error_8[SUBSETS.index(())], phi_3)
+    first, *added, last = panel.patches
+    ends = [first.get_width(), *(bar.get_x() + bar.get_width() for bar in added)]
+    assert [bar.get_x() for bar in added] == pytest.approx(ends[:-1])
+    assert [bar.get_width() for bar in added] == pytest.approx(sorted(100 * phi_3))
+    assert last.get_width() == pytest.approx(ends[-1]) == pytest.approx(100 * error_8[ALL])
     plt.close(figure)
 
 

@@ -9,17 +9,20 @@ from gpca.attribution.predictions import write_predictions
 from gpca.causes.dataset import LABELS, labels_of
 from gpca.causes.judged import CEILING
 from gpca.causes.settings import CauseSettings
-from gpca.causes.truth import FAILED
+from gpca.causes.truth import FAILED, shapley_values
 from gpca.classifier.scores import Attribution
 from gpca.config.check import check
 from gpca.errors import InputError
 from gpca.evaluation.measures import POOLED
 from gpca.experiments.cause_figures import draw_reenactment, usual_failure
 from gpca.experiments.reenactment import EXPERIMENT, MEASURED, collect_oracles, in_words, table9_oracle
+from gpca.objects.canonical import write_objects
+from gpca.objects.procedural import surfaces
+from gpca.pairs.perturbation import CONCEPTS
 from gpca.reenactment.dataset import Reenactments, reenact_all
 from gpca.reenactment.settings import EVERYTHING, KNOWN, NOTHING, ReenactmentSettings
 from tests.config.configs import changed
-from tests.conftest import FEW_CAUSES
+from tests.conftest import FEW_CAUSES, FOUR
 from tests.experiments.runs import run_with
 from tests.figures import assert_words_are_large_enough_and_inside, words_of
 
@@ -47,9 +50,10 @@ def enacted(causes):
 @pytest.fixture(scope="module")
 def shown_files(causes, enacted, tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
-    paths = [folder / name / "four/seed100.npz" for name in ("causes", "reenactments")]
-    causes.save(paths[0])
-    enacted.save(paths[1])
+    paths = [folder / "objects.npz", *(folder / name / "four/seed100.npz" for name in ("causes", "reenactments"))]
+    write_objects((surface for surface in surfaces("ycb") if surface.name in FOUR), "four", paths[0], n_points=6000)
+    causes.save(paths[1])
+    enacted.save(paths[2])
     return paths
 
 
@@ -77,10 +81,14 @@ def test_the_sample_failed_by_several_causes_and_has_several_hypotheses_where_on
 def test_hypotheses_clouds_and_eight_errors_are_shown_with_their_words(causes, enacted, shown_files):
     figure = draw(shown_files)
     assert_words_are_large_enough_and_inside(figure)
-    words, row = words_of(figure), usual_failure(causes, shown_files[0], enacted.weight[:, 1] > 0)
+    words, row = words_of(figure), usual_failure(causes, shown_files[1], enacted.weight[:, 1] > 0)
     weights = enacted.weight[row][enacted.weight[row] > 0]
-    assert {f"{k + 1}: {100 * weight:.0f} %" for k, weight in enumerate(weights)} <= set(words)
-    assert {"as observed", "without noise", "completed", "both", "none", "all three", "measured"} <= set(words)
+    strip = {"after ICP", f"likeliest pose: {100 * weights[0]:.0f} %", "there, without noise", "there, completed"}
+    assert strip | {"none", "all three", "measured"} <= set(words)
+    phi_3 = shapley_values((weights[:, None] * enacted.error[row][: len(weights)]).sum(axis=0)[None])[0]
+    named, true = CONCEPTS[int(np.argmax(phi_3))], causes.truth.dominant[row]
+    verdict = f"It names {named}, as measured" if named == true else f"It names {named}; measured is {true}"
+    assert any(verdict in each for each in words)
     [bars] = [panel for panel in figure.findobj(lambda each: hasattr(each, "barh")) if len(panel.patches) == 8]
     assert sorted(bar.get_width() for bar in bars.patches) == pytest.approx(sorted(100 * causes.truth.error[row]))
     assert len(bars.collections) == len(weights)
@@ -95,7 +103,7 @@ def test_a_file_of_other_settings_is_refused(causes, enacted, shown_files, tmp_p
     replace(enacted, error=enacted.error + 0.01).save(path)
     assert Reenactments.load(path, causes.registrations).error.shape == enacted.error.shape
     with pytest.raises(InputError, match="has other errors of sample"):
-        draw((shown_files[0], path))
+        draw((*shown_files[:2], path))
 
 
 @pytest.fixture(scope="module")

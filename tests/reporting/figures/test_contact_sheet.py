@@ -6,12 +6,13 @@ import pytest
 
 from gpca.errors import InputError
 from gpca.io.arrays import save_arrays
-from gpca.reporting.figures import contact_sheet
-from gpca.reporting.figures.contact_sheet import draw_contact_sheet, render_cloud
+from gpca.reporting.figures.cloud_views import view_from
+from gpca.reporting.figures.contact_sheet import draw_contact_sheet
+from gpca.reporting.figures.solid import Solid
 from gpca.seeds import generator
 
 ROOT = Path(__file__).parents[3]
-FROM_ABOVE = (-math.pi / 2, math.pi / 2)  # the eye looks down, x to the right, y up
+FROM_ABOVE = view_from(-math.pi / 2, math.pi / 2)  # the eye looks down, x to the right, y up
 COUNT = 6000
 
 
@@ -41,6 +42,10 @@ def _write_objects(path, names):
     return path
 
 
+def render_cloud(*args):
+    return Solid.of(*args).image
+
+
 def test_shows_the_nearer_of_two_surfaces():
     slanted = np.array([0.8, 0.0, 0.6])
     low = _square(0.0, [0.0, 0.0, 1.0])
@@ -56,7 +61,7 @@ def test_shows_the_nearer_of_two_surfaces():
 
 
 def test_ball_is_a_closed_disc_on_white_lit_from_above_left():
-    image = render_cloud(*_ball(0.03, "ball"), (0.3, 0.5), 80)
+    image = render_cloud(*_ball(0.03, "ball"), view_from(0.3, 0.5), 80)
     assert image.shape == (80, 80, 3)
     assert image.min() >= 0
     assert image.max() == 1
@@ -80,6 +85,13 @@ def test_unit_of_length_and_sign_of_normals_do_not_matter_and_flat_clouds_are_dr
     assert image.min() < 1
 
 
+def test_a_point_is_hidden_by_what_lies_in_front_of_it():
+    ball = Solid.of(*_ball(0.03, "ball"), FROM_ABOVE, 40)
+    assert ball.extent == pytest.approx([each * 0.03 / 0.9 for each in (-1, 1, -1, 1)], rel=0.02)
+    seen = np.array([[0.0, 0.0, 0.03], [0.0, 0.0, 0.02], [0.0, 0.0, -0.03], [0.032, 0.032, -0.03], [1.0, 0.0, -1.0]])
+    assert ball.hides(seen).tolist() == [False, True, True, False, False]
+
+
 def test_a_sheet_is_as_wide_as_the_text_and_the_same_bytes_each_time(tmp_path, same_bytes):
     objects = _write_objects(tmp_path / "balls.npz", ["025_mug", "a_ball"])
     image = same_bytes(lambda: draw_contact_sheet(objects, "Balls (procedural stand-in)"))
@@ -91,7 +103,8 @@ def test_a_sheet_is_as_wide_as_the_text_and_the_same_bytes_each_time(tmp_path, s
 def test_no_caption_touches_another(tmp_path, monkeypatch, count):
     names = [f"{index:03d}_an_extra_large_thing_{'w' * (index % 9)}" for index in range(count)]
     objects = _write_objects(tmp_path / "many.npz", names)
-    monkeypatch.setattr(contact_sheet, "render_cloud", lambda *cloud: np.ones((2, 2, 3)))  # only the text matters here
+    blank = Solid(np.ones((2, 2, 3)), (0, 1, 0, 1), np.ones((4, 4)), np.eye(3))
+    monkeypatch.setattr(Solid, "of", lambda *cloud: blank)  # only the text matters here
     figure = draw_contact_sheet(objects, "Many things (procedural stand-in)")
     figure.draw_without_rendering()
     texts = [*figure.texts, *(axes.title for axes in figure.axes)]
