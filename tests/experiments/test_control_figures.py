@@ -6,8 +6,8 @@ import pytest
 
 from gpca.declarations.plan import Run
 from gpca.errors import InputError
-from gpca.evaluation.measures import AGAINST, KEYS, NUMBERS
-from gpca.experiments.control_tables import transfer
+from gpca.evaluation.measures import AGAINST, KEYS, NUMBERS, POOLED
+from gpca.experiments.control_tables import loophole
 from gpca.experiments.severity_curves import COLUMNS as SEVERITIES
 from gpca.experiments.severity_curves import REGISTRATION, SAMPLES, SUCCEEDS, severity_curves
 from gpca.explainers.registry import explainer_entry
@@ -28,17 +28,19 @@ def severities():
 
 def intervals():
     rows = [
-        ("paper", one, method, "accuracy", "all", "", "", 1, 1, 9, 0.5, np.nan, np.nan)
-        if one == other
-        else ("transfer", one, method, "accuracy", other, "", "", 1, 1, 9, 0.5, np.nan, np.nan)
-        for one in SOURCES
-        for other in SOURCES
-        for method in EXPLAINERS
+        (control, POOLED, method, "accuracy", concept, "", "", 1, 4, 9, value, value - 0.1, value + 0.05)
+        for control, concept, values in (
+            ("paper", "all", (0.9, 0.95)),
+            ("transfer", POOLED, (0.6, 0.9)),
+            ("hard", "all", (0.5, 0.4)),
+        )
+        for method, value in zip(EXPLAINERS, values, strict=True)
     ]
+    rows.append(("transfer", "ycb", "gpca", "accuracy", "cups", "", "", 1, 2, 9, 0.1, 0.0, 0.2))
     return pd.DataFrame(rows, columns=[*KEYS, *AGAINST, *NUMBERS])
 
 
-DRAWN = [(lambda frame: severity_curves(RUN, frame), severities), (lambda frame: transfer(RUN, frame), intervals)]
+DRAWN = [(lambda frame: severity_curves(RUN, frame), severities), (lambda frame: loophole(RUN, frame), intervals)]
 
 
 @pytest.mark.parametrize(("draw", "numbers"), DRAWN)
@@ -66,10 +68,14 @@ def test_bins_of_one_severity_are_weighted_by_their_samples():
     assert "50" in [text.get_text() for text in translation.texts]  # (27 * 40 + 9 * 80) / 36
 
 
-def test_sources_are_named_on_the_axes_of_transfer():
-    figure = transfer(RUN, intervals())
-    assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == ["YCB", "Cups"]
-    assert figure.axes[-1].get_ylabel() == "accuracy (%)"
+def test_each_explainer_is_a_line_over_the_steps_that_were_run_and_ends_with_its_number():
+    [panel] = loophole(RUN, intervals()).axes
+    lines = {container.get_label(): container for container in panel.containers}
+    assert set(lines) == set(EXPLAINERS.values())
+    assert lines[EXPLAINERS["gpca"]].lines[0].get_ydata() == pytest.approx([90, 60, 50])
+    assert lines[EXPLAINERS["rule"]].lines[0].get_ydata() == pytest.approx([95, 90, 40])
+    assert {text.get_text() for text in panel.texts} == {"50", "40"}
+    assert [np.round(x) for x in lines[EXPLAINERS["gpca"]].lines[0].get_xdata()] == [0, 2, 3]  # no unseen objects
 
 
 @pytest.mark.parametrize(("draw", "numbers"), DRAWN)
