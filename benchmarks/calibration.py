@@ -75,7 +75,7 @@ def registered(explainer, count: int, tolerance: str, shifted: bool) -> Iterator
         T_error = explanation.T_target_source @ T_off
         T_error[:3, 3] /= diameter
         error = diameter * float(surface.errors(inverses(T_error[None]))[0])
-        yield explanation.diagnosis, error <= explanation.tolerance
+        yield explanation.diagnosis, error <= explanation.diagnosis.tolerance
         if number % 50 == 49:
             print(f"{number + 1} of {count}", file=sys.stderr)
 

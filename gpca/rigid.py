@@ -61,8 +61,10 @@ def as_rows(T_b_a: np.ndarray, reach: float) -> list[str]:
 
 
 def rotation_angle_rad(T_b_a: np.ndarray) -> float:
-    """Return the angle of the rotation, in [0, π]."""
-    return float(np.arccos(np.clip((np.trace(T_b_a[:3, :3]) - 1) / 2, -1, 1)))
+    """Return the angle of the rotation, in [0, π]; an arc cosine alone would lose half of the digits near 0 and π."""
+    R = T_b_a[:3, :3]
+    twice_sine = np.sqrt((R[2, 1] - R[1, 2]) ** 2 + (R[0, 2] - R[2, 0]) ** 2 + (R[1, 0] - R[0, 1]) ** 2)
+    return float(np.arctan2(twice_sine, np.trace(R) - 1))
 
 
 def require_rotation(T_b_a: np.ndarray, subject: object, tolerance: float = 1e-3) -> None:

@@ -59,11 +59,11 @@ def test_a_transform_moves_homogeneous_points_and_scales_with_the_unit_of_length
     assert np.array_equal(T_m, pose())
 
 
-@pytest.mark.parametrize("angle_rad", [0.0, 1e-3, 0.5, 3.0, np.pi])
+@pytest.mark.parametrize("angle_rad", [0.0, 1e-7, 1e-3, 0.5, 3.0, np.pi])
 def test_the_angle_is_that_of_the_rotation(angle_rad):
     T_b_a = pose()
     T_b_a[:3, :3] = Rotation.from_rotvec(angle_rad * np.array([0.6, 0.0, 0.8])).as_matrix()
-    assert rotation_angle_rad(T_b_a) == pytest.approx(angle_rad, abs=1e-6)
+    assert rotation_angle_rad(T_b_a) == pytest.approx(angle_rad, rel=1e-8, abs=1e-12)
 
 
 def test_directions_are_unit_and_favour_no_side():

@@ -95,7 +95,7 @@ class GroupMLP(nn.Module):
 
     def _normalize(self, norm: BatchNorm, y_E_F: torch.Tensor, edges: _Edges, pool: bool = False) -> torch.Tensor:
         if not self.training:
-            arrays = [x.detach().numpy() for x in (y_E_F, *norm.scale_and_shift())]
+            arrays = y_E_F.detach().numpy(), *norm.scale_and_shift()
             if pool:
                 return torch.from_numpy(kernels.normalize_max(*arrays, edges.ends, edges.batch)[0])
             return torch.from_numpy(kernels.normalize(*arrays, edges.cloud_ends))

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from torch import nn
 
 NEGATIVE_SLOPE = 0.2
-EPSILON = 1e-5  # added to variances by batch norm
+EPSILON = 1e-5  # added to variances by batch norm, of these parts
+NORM = ("weight", "bias", "running_mean", "running_var")
 WIDTHS = (64, 64, 128, 256)  # of the EdgeConvs
 CHANNELS = 32  # that torch adds at once
 BLOCK = 16  # rows whose sum is made before it is added to others, as torch does for at most 2¹⁹ rows
@@ -90,13 +91,13 @@ def embed_clouds(
     for layer in range(sum(name.startswith("edge_convs.") and name.endswith(".norm.weight") for name in weights)):
         neighbors_B_N_k = nearest(x_B_N_F, k, sizes)
         w1, w2 = np.split(weights[f"edge_convs.{layer}.weight"], 2, axis=1)
-        ac_B_N_2F = _product(x_B_N_F.reshape(-1, x_B_N_F.shape[2]), np.concatenate([w1, w2 - w1]).T)
+        ac_B_N_2F = product(x_B_N_F.reshape(-1, x_B_N_F.shape[2]), np.concatenate([w1, w2 - w1]).T)
         ac_B_N_2F = ac_B_N_2F.reshape(*x_B_N_F.shape[:2], -1)
-        scale_and_shift = _scale_and_shift(weights, f"edge_convs.{layer}.norm")
-        x_B_N_F = edge_kernels.gather_max_affine(ac_B_N_2F, neighbors_B_N_k, *scale_and_shift, NEGATIVE_SLOPE)
+        affine = scale_and_shift(*_norm(weights, f"edge_convs.{layer}.norm"))
+        x_B_N_F = edge_kernels.gather_max_affine(ac_B_N_2F, neighbors_B_N_k, *affine, NEGATIVE_SLOPE)
         features.append(x_B_N_F)
     joined_P_F = np.concatenate(features, axis=-1).reshape(-1, sum(part.shape[2] for part in features))
-    y_P_F = _normalized(_product(joined_P_F, weights["point_layer.weight"].T), weights, "point_norm")
+    y_P_F = _normalized(product(joined_P_F, weights["point_layer.weight"].T), weights, "point_norm")
     y_B_N_F = np.where(y_P_F > 0, y_P_F, y_P_F * np.float32(NEGATIVE_SLOPE)).reshape(*x_B_N_F.shape[:2], -1)
     parts = [y_B_N_F] if sizes is None else np.split(y_B_N_F, np.cumsum(sizes[:-1]), axis=1)
     return np.concatenate([np.concatenate([part.max(axis=1), _mean(part)], axis=-1) for part in parts])
@@ -117,7 +118,7 @@ def nearest(x_B_N_F: np.ndarray, k: int, sizes: Sequence[int] | None = None) -> 
     # not change which points are nearest.
     rows_B_N_G = np.concatenate([x_B_N_F, np.ones_like(x_B_N_F[..., :1])], axis=-1)
     columns_B_N_G = np.concatenate([-2 * x_B_N_F, _squares(x_B_N_F)[..., None]], axis=-1)
-    return edge_kernels.smallest_k(_product(rows_B_N_G, np.swapaxes(columns_B_N_G, 1, 2)), k)
+    return edge_kernels.smallest_k(product(rows_B_N_G, np.swapaxes(columns_B_N_G, 1, 2)), k)
 
 
 def expected_shapes(point_features: int = 256, inputs: int = 3, widths: Sequence[int] = WIDTHS) -> dict[str, tuple]:
@@ -130,28 +131,31 @@ def expected_shapes(point_features: int = 256, inputs: int = 3, widths: Sequence
 
 
 def _norm_shapes(name: str, features: int) -> dict[str, tuple]:
-    parts = ("weight", "bias", "running_mean", "running_var")
-    return {f"{name}.{part}": (features,) for part in parts} | {f"{name}.num_batches_tracked": ()}
+    return {f"{name}.{part}": (features,) for part in NORM} | {f"{name}.num_batches_tracked": ()}
 
 
-def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return ``a @ b`` of matrices, stacked or not."""
     with np.errstate(over="ignore", invalid="ignore"):  # as torch; a diverging training is stopped by its loss
         return np.matmul(a, b)
 
 
-def _scale_and_shift(weights: Mapping[str, np.ndarray], norm: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return scale and shift (F,) of a batch norm in inference."""
-    weight_F, bias_F, mean_F, variance_F = (
-        weights[f"{norm}.{part}"] for part in ("weight", "bias", "running_mean", "running_var")
-    )
+def scale_and_shift(
+    weight_F: np.ndarray, bias_F: np.ndarray, mean_F: np.ndarray, variance_F: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return scale and shift (F,) of a batch norm in inference: the output is ``scale * y + shift``."""
     scale_F = weight_F * (np.float32(1) / np.sqrt(variance_F + np.float32(EPSILON)))
     return scale_F, bias_F - scale_F * mean_F
 
 
+def _norm(weights: Mapping[str, np.ndarray], name: str) -> list[np.ndarray]:
+    return [weights[f"{name}.{part}"] for part in NORM]
+
+
 def _normalized(x_P_F: np.ndarray, weights: Mapping[str, np.ndarray], norm: str) -> np.ndarray:
     """Return the batch norm of x; products are added before they are rounded, as torch's layer does."""
-    scale_F, _ = _scale_and_shift(weights, norm)
-    bias_F, mean_F = (weights[f"{norm}.{part}"].astype(np.float64) for part in ("bias", "running_mean"))
+    parts = _norm(weights, norm)
+    scale_F, (_, bias_F, mean_F, _) = scale_and_shift(*parts)[0], (part.astype(np.float64) for part in parts)
     shift_F = (bias_F - mean_F * scale_F).astype(np.float32)
     return (x_P_F.astype(np.float64) * scale_F + shift_F).astype(np.float32)
 

@@ -10,11 +10,7 @@ import numpy as np
 import torch
 from torch import nn
 
-
-def product(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
-    """Return ``a @ b`` of CPU tensors, stacked or not, without a gradient."""
-    with np.errstate(over="ignore", invalid="ignore"):  # as torch; a diverging training is stopped by its loss
-        return torch.from_numpy(np.matmul(a.detach().numpy(), b.detach().numpy()))
+from gpca.encoders.inference import NORM, product, scale_and_shift
 
 
 def linear(x_I: torch.Tensor, weight_O_I: torch.Tensor) -> torch.Tensor:
@@ -45,10 +41,9 @@ class BatchNorm(nn.BatchNorm1d):
     num_batches_tracked: torch.Tensor
     momentum: float
 
-    def scale_and_shift(self) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return scale and shift (F,) of inference: the output is ``scale * y + shift``."""
-        scale_F = self.weight * torch.rsqrt(self.running_var + self.eps)
-        return scale_F, self.bias - scale_F * self.running_mean
+    def scale_and_shift(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return scale and shift (F,) of inference."""
+        return scale_and_shift(*(getattr(self, part).detach().numpy() for part in NORM))
 
     @torch.no_grad()
     def track(self, mean_F: torch.Tensor, variance_F: torch.Tensor, count: int) -> None:
@@ -58,27 +53,31 @@ class BatchNorm(nn.BatchNorm1d):
         self.running_var.lerp_(variance_F * (count / (count - 1)), self.momentum)
 
 
+def _product(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
+    return torch.from_numpy(product(a.detach().numpy(), b.detach().numpy()))
+
+
 class _Linear(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, x_N_I: torch.Tensor, weight_O_I: torch.Tensor) -> torch.Tensor:
         ctx.save_for_backward(x_N_I, weight_O_I)
-        return product(x_N_I, weight_O_I.T)
+        return _product(x_N_I, weight_O_I.T)
 
     @staticmethod
     def backward(ctx: Any, *grads: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
         (grad_N_O,), (x_N_I, weight_O_I) = grads, ctx.saved_tensors
         wanted_x, wanted_weight = ctx.needs_input_grad
-        by_x = product(grad_N_O, weight_O_I) if wanted_x else None
-        return by_x, product(grad_N_O.T, x_N_I) if wanted_weight else None
+        by_x = _product(grad_N_O, weight_O_I) if wanted_x else None
+        return by_x, _product(grad_N_O.T, x_N_I) if wanted_weight else None
 
 
 class _StackedProduct(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
         ctx.save_for_backward(a, b)
-        return product(a, b)
+        return _product(a, b)
 
     @staticmethod
     def backward(ctx: Any, *grads: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         (grad,), (a, b) = grads, ctx.saved_tensors
-        return product(grad, b.mT), product(a.mT, grad)
+        return _product(grad, b.mT), _product(a.mT, grad)

@@ -91,7 +91,10 @@ class Guaranteed:
             ALARM: f"at most {self.false_alarms:.0%} of the good ones are called so",
         }
         why = risk.get(self.call, "neither call keeps its promise here")
-        lines = [f"set       {states} ({self.level:.0%} of such sets hold the truth)", f"alarm     {self.call} ({why})"]
+        lines = [
+            f"set       {states} (in {self.level:.0%} of cases, such a set contains the true state)",
+            f"alarm     {self.call} ({why})",
+        ]
         return [*lines, f"promise   {self.basis}"] if self.labeled else lines
 
     @property

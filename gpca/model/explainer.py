@@ -114,12 +114,8 @@ class Explainer:
         started = perf_counter()
         seconds: dict[str, float] = {}
         notes: list[str] = []
-        with _timed(seconds, "preparation"):
-            inputs = (source_points, target_points, T_target_source_init, unit, frame)
-            clouds = Clouds.prepared(*inputs, self.model.cloud_points, self.model.icp, notes, source_unit)
-            limit = _limit(clouds, tolerance, unit)
-        with _timed(seconds, "icp"):
-            outcome = self._aligned(clouds, method, notes) if register else _as_given(clouds)
+        inputs = (source_points, target_points, T_target_source_init, unit, frame)
+        clouds, limit, outcome = self._registered(inputs, source_unit, tolerance, method, register, notes, seconds)
         T_found = outcome.T_target_source
         voids = voids_of(clouds.source, clouds.target, outcome.fitness, self.model.familiar)
         diagnosis = None
@@ -165,7 +161,9 @@ class Explainer:
         repaired = None
         if repair:
             with _timed(seconds, "repair"):
-                repaired = Repair.of(self.model, clouds, outcome, method if register else GIVEN, limit, unit=unit)
+                found = () if fast else enactments
+                by = method if register else GIVEN
+                repaired = Repair.of(self.model, clouds, outcome, by, limit, unit, found)
         rescale = diagnosis is not None and diagnosis.wrong_scale
         if repaired is not None and repaired.verdict == REPAIRED and not rescale:
             decision = Decision(TAKE, "", repaired.reason)
@@ -194,7 +192,6 @@ class Explainer:
             spread=spread,
             repaired=repaired and replace(repaired, scene=None),
             unit=unit,
-            tolerance=limit,
             seconds=seconds | {"total": perf_counter() - started},
             notes=tuple(notes),
             warnings=tuple(warnings),
@@ -227,10 +224,8 @@ class Explainer:
         started = perf_counter()
         notes: list[str] = []
         inputs = (source_points, target_points, T_target_source_init, unit, frame)
-        clouds = Clouds.prepared(*inputs, self.model.cloud_points, self.model.icp, notes, source_unit)
-        limit = _limit(clouds, tolerance, unit)
-        outcome = self._aligned(clouds, method, notes) if register else _as_given(clouds)
-        repaired = Repair.of(self.model, clouds, outcome, method if register else GIVEN, limit, unit=unit)
+        clouds, limit, outcome = self._registered(inputs, source_unit, tolerance, method, register, notes, {})
+        repaired = Repair.of(self.model, clouds, outcome, method if register else GIVEN, limit, unit)
         return replace(repaired, notes=tuple(notes), seconds=perf_counter() - started)
 
     def judge(
@@ -321,6 +316,27 @@ class Explainer:
             return Decision(REFINE, "", f"registrations from such starts fail with probability {diagnosis.start:.2f}")
         return decision
 
+    def _registered(
+        self,
+        inputs: tuple[Any, Any, np.ndarray | None, str, CanonicalFrame | None],
+        source_unit: str | None,
+        tolerance: Tolerance | str,
+        method: str | None,
+        register: bool,
+        notes: list[str],
+        seconds: dict[str, float],
+    ) -> tuple[Clouds, float, Outcome]:
+        """Return the prepared clouds, how far the pose may be off, in the unit of the points, and the registration.
+
+        The inputs are both clouds, the initial pose, unit and frame.
+        """
+        with _timed(seconds, "preparation"):
+            clouds = Clouds.prepared(*inputs, self.model.cloud_points, self.model.icp, notes, source_unit)
+            allowed = tolerance if isinstance(tolerance, Tolerance) else Tolerance.parse(tolerance)
+            limit = allowed.length(clouds.target, clouds.frame.diameter, inputs[3])
+        with _timed(seconds, "icp"):
+            return clouds, limit, self._aligned(clouds, method, notes) if register else _as_given(clouds)
+
     def _aligned(self, clouds: Clouds, method: str | None, notes: list[str]) -> Outcome:
         """Register by the model's own ICP or by the given method; a failure adds a note."""
         if method is None:
@@ -377,12 +393,6 @@ def judge(
 def repair(source_points: np.ndarray, target_points: np.ndarray, *options: Any, **named: Any) -> Repair:
     """Put a registration right by the default model, see :meth:`Explainer.repair`; for many pairs, load one once."""
     return Explainer.load().repair(source_points, target_points, *options, **named)
-
-
-def _limit(clouds: Clouds, tolerance: Tolerance | str, unit: str) -> float:
-    """Return how far the pose may be off, in the unit of the points."""
-    allowed = tolerance if isinstance(tolerance, Tolerance) else Tolerance.parse(tolerance)
-    return allowed.length(clouds.target, clouds.frame.diameter, unit)
 
 
 def _as_given(clouds: Clouds) -> Outcome:

@@ -179,7 +179,6 @@ class Explanation(ExplainedRegistration):
 
     diagnosis: Diagnosis | None  # state and causes, learned from measured causes; None if not requested
     repaired: ExplainedRegistration | None = None  # a :class:`gpca.model.repaired.Repair`, if requested
-    tolerance: float  # how far the pose may be off, in the unit of the points
     scores: dict[str, float]
     variances: dict[str, float]
     bald: float

@@ -16,7 +16,7 @@ from gpca.causes.truth import capped
 from gpca.guarantee.acceptance import accepted_below
 from gpca.io.arrays import TEXT
 from gpca.io.container import Container, array
-from gpca.model.repair import Proposals, by_mixture, measured, propose
+from gpca.model.repair import Proposals, measured, propose, unrefined
 from gpca.model.result import Calibrated, Evidence, ResultJudge
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.distances import ObservedPair
@@ -91,10 +91,10 @@ def pose_errors(causes: Causes, objects: ObjectClouds) -> Errors:
 def propose_for(
     pair: ObservedPair, T_K: np.ndarray, weight_K: np.ndarray, icp: ICPSettings, moved: Moved, surface: ModelSurface
 ) -> Proposals:
-    """Return the proposals for a pair under hypotheses (K, 4, 4), as a repair refines them."""
+    """Return the proposals for a pair under hypotheses (K, 4, 4), which the search has refined on all of its points."""
     before, registered = transform(pair.T_init, pair.observed), inverse(pair.T_init)
-    refine, measure = by_mixture(pair.model, surface.spacing), measured(before, pair.model, icp, moved)
-    return propose(before, surface, registered, T_K, weight_K, refine, measure)
+    measure = measured(before, pair.model, icp, moved)
+    return propose(before, surface, registered, T_K, weight_K, unrefined, measure)
 
 
 def proposed_for_all(

@@ -18,25 +18,25 @@ from gpca.alignment.methods.registry import make_method
 from gpca.causes.settings import MODEL, Moved
 from gpca.model.result import Calibrated, Evidence, ResultJudge
 from gpca.pairs.distances import ObservedPair
-from gpca.reenactment.enactment import whole_surface
+from gpca.reenactment.enactment import completed, observed_at
 from gpca.reenactment.hypotheses import (
     FEWEST_INLIERS,
     LAST_ITERATIONS,
     SAME,
     distinct_rows,
     find_hypotheses,
+    fits_at,
     search_starts,
     weights_of,
 )
-from gpca.reenactment.mixture import Mixture
+from gpca.reenactment.mixture import Mixture, densities_of
 from gpca.reenactment.settings import ReenactmentSettings
-from gpca.reenactment.surface import ModelSurface, covered_points
+from gpca.reenactment.surface import ModelSurface
 from gpca.rigid import inverse, inverses, transform
 from gpca.seeds import generator
 
 GOOD, REPAIRED, NOT_REPAIRED, SEVERAL = VERDICTS = ("good", "repaired", "not repaired", "several poses fit")
 LEAST_WEIGHT = 0.05  # of a pose that is offered beside others
-OF_WIDTH = 0.7  # of the mixture's width: the noise, without the gaps between the target's points
 LARGE = 0.5  # of the largest distance: from this on, a point belongs to the part in which two poses differ
 OF_ESTIMATE = 0.5  # probability of the estimate of the true pose beside the hypotheses
 SWEPT, SWEPT_MODEL, CONTINUED = 64, 128, 6  # points that ICP sees from many starts; ends from which it sees all
@@ -51,7 +51,8 @@ class Proposals:
 
     T_n: np.ndarray  # (n, 4, 4) the registered pose; then hypotheses, refined, each once, the most probable first
     weight_n: np.ndarray  # (n,) probabilities of the hypotheses that end there, 0 for the registered pose
-    evidence: Evidence  # of the n poses, as :func:`likely_errors` has it
+    evidence: Evidence  # of the n poses, as :class:`TruePoses` has it
+    true_poses: TruePoses | None = None  # None where it was read from a file
 
     def set_of(self, rows: list[int]) -> Evidence:
         """Return the evidence of the claim that one of these poses is right, which fits as the first of them does."""
@@ -93,24 +94,38 @@ def propose(
     apart_k_n = np.stack([surface.apart(T_k @ inverse(T_k[row])) for row in rows], axis=1)
     weight_n = np.bincount(apart_k_n.argmin(axis=1), weight_K[possible], minlength=len(rows))
     T_n = np.concatenate([T_registered[None], T_k[rows]])
-    distance_n_K, weight_n_K = likely_errors(observed, surface, T_n, T_K, weight_K)
+    true_poses = TruePoses.of(observed, surface, T_K, weight_K)
+    distance_n_K, weight_n_K = true_poses.errors(T_n)
     weight_n_K[0] = np.append(weight_K, 0.0)  # as any judge of results has it
     fitness_n, rmse_n = measure(T_n)
-    return Proposals(T_n, np.append(0.0, weight_n), Evidence(distance_n_K, weight_n_K, rmse_n, fitness_n))
+    return Proposals(T_n, np.append(0.0, weight_n), Evidence(distance_n_K, weight_n_K, rmse_n, fitness_n), true_poses)
 
 
-def likely_errors(
-    observed: np.ndarray, surface: ModelSurface, T_n: np.ndarray, T_K: np.ndarray, weight_K: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return errors (n, K + 1) of poses (n, 4, 4), and how probable each error is.
+@dataclass(frozen=True)
+class TruePoses:
+    """Poses that may be true.
 
-    A pose that was refined from a hypothesis (K, 4, 4) agrees with it, right or wrong. One more estimate of the true
-    pose, by another criterion, therefore stands beside them.
+    A pose that was refined from a hypothesis agrees with it, right or wrong. One more estimate of the true pose, by
+    another criterion, therefore stands beside the hypotheses.
     """
-    whole = whole_surface(observed, surface, T_K[int(np.argmax(weight_K))])
-    back_k = inverses(np.concatenate([T_K, best_end(observed, surface)[None]]))
-    weight_k = np.append((1 - OF_ESTIMATE) * weight_K, OF_ESTIMATE)
-    return np.stack([whole.errors(T @ back_k) for T in T_n]), np.tile(weight_k, (len(T_n), 1))
+
+    whole: (
+        ModelSurface  # by which errors are measured: as what was observed under the likeliest hypothesis completes it
+    )
+    T_k: np.ndarray  # (k, 4, 4)
+    weight_k: np.ndarray  # probabilities
+
+    @classmethod
+    def of(cls, observed: np.ndarray, surface: ModelSurface, T_K: np.ndarray, weight_K: np.ndarray) -> TruePoses:
+        """Return hypotheses (K, 4, 4) of the true pose of observed points (N, 3), and the other estimate."""
+        whole = completed(surface, observed_at(T_K[int(np.argmax(weight_K))], observed, surface))
+        T_k = np.concatenate([T_K, best_end(observed, surface)[None]])
+        return cls(whole, T_k, np.append((1 - OF_ESTIMATE) * weight_K, OF_ESTIMATE))
+
+    def errors(self, T_n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return errors (n, k) of poses (n, 4, 4), and how probable each error is."""
+        back_k = inverses(self.T_k)
+        return np.stack([self.whole.errors(T @ back_k) for T in T_n]), np.tile(self.weight_k, (len(T_n), 1))
 
 
 def best_end(observed: np.ndarray, surface: ModelSurface) -> np.ndarray:
@@ -138,8 +153,9 @@ def by_mixture(model: np.ndarray, spacing: float) -> Refine:
     mixture = Mixture(model, spacing / 2)
 
     def refine(observed: np.ndarray, T_k: np.ndarray) -> np.ndarray:
-        width_k = mixture.fit(observed, T_k, LAST_ITERATIONS, moving=False).width_n
-        return mixture.fit(observed, T_k, LAST_ITERATIONS, width_n=width_k).T_n
+        densities = densities_of(observed, model)
+        width_k = mixture.fit(observed, T_k, LAST_ITERATIONS, moving=False, densities=densities).width_n
+        return mixture.fit(observed, T_k, LAST_ITERATIONS, width_n=width_k, densities=densities).T_n
 
     return refine
 
@@ -218,9 +234,8 @@ def verdict_of(
 
 
 def inliers(points: np.ndarray, surface: ModelSurface, T_K: np.ndarray) -> np.ndarray:
-    """Return which points (K, N) are no outliers at poses (K, 4, 4); all, where next to none would be left."""
-    fits = Mixture(surface.points, surface.spacing / 2).fit(points, T_K, LAST_ITERATIONS, moving=False)
-    inlier_K_N = fits.inlier_n_N > 0.5
+    """Return which points (K, N) lie on the surface at poses (K, 4, 4); all, where next to none would be left."""
+    inlier_K_N = fits_at(T_K, points, surface).inlier_n_N > 0.5
     return inlier_K_N | (inlier_K_N.sum(axis=1) < FEWEST_INLIERS)[:, None]
 
 
@@ -250,8 +265,6 @@ def unseen(points: np.ndarray, surface: ModelSurface, T: np.ndarray) -> tuple[fl
 
     It is None where they leave out next to nothing.
     """
-    fits = Mixture(surface.points, surface.spacing / 2).fit(points, T[None], LAST_ITERATIONS, moving=False)
-    inlier_N, blur = fits.inlier_n_N[0] > 0.5, OF_WIDTH * float(fits.width_n[0])
-    seen = transform(T, points[inlier_N] if inlier_N.sum() >= FEWEST_INLIERS else points)
-    missing_M = ~covered_points(surface.points, seen, blur, generator("repair", "blur"))
-    return float(1 - inlier_N.mean()), Part.of(surface, missing_M) if missing_M.any() else None
+    observation = observed_at(T, points, surface)
+    missing_M = ~observation.covered
+    return observation.outliers, Part.of(surface, missing_M) if missing_M.any() else None

@@ -42,6 +42,8 @@ from gpca.model.scene import Scene
 from gpca.model.undetermined import Undetermined, undetermined_at
 from gpca.numerals import in_decimals
 from gpca.objects.canonical import CanonicalFrame
+from gpca.reenactment.enactment import Enactment
+from gpca.reenactment.hypotheses import weights_of
 from gpca.reenactment.registration import pose_posterior
 from gpca.reenactment.surface import ModelSurface
 from gpca.rigid import transform
@@ -106,7 +108,16 @@ class Repair(ExplainedRegistration):
     seconds: float = 0.0  # duration
 
     @classmethod
-    def of(cls, model: Model, clouds: Clouds, outcome: Outcome, method: str | None, limit: float, unit: str) -> Repair:
+    def of(
+        cls,
+        model: Model,
+        clouds: Clouds,
+        outcome: Outcome,
+        method: str | None,
+        limit: float,
+        unit: str,
+        enactments: Sequence[Enactment] = (),
+    ) -> Repair:
         """Put a registration right, if it is wrong.
 
         Args:
@@ -114,6 +125,7 @@ class Repair(ExplainedRegistration):
             method: of the registration, None for the model's ICP, or `GIVEN`. A local one that was named refines the
                 hypotheses; else, the likelihood does by which they were found.
             limit: how far the pose may be off, in the unit of the points.
+            enactments: of the diagnosis of this registration, whose hypotheses are taken; else they are sought.
         """
         frame, T_init, T = clouds.frame, clouds.T_target_source_init, outcome.T_target_source
         diagnoser, tolerance, T_registered = model.diagnoser, limit / frame.diameter, frame.pose_outside(T) @ T_init
@@ -150,6 +162,9 @@ class Repair(ExplainedRegistration):
         measure = measured(before, pair.model, diagnoser.runs.icp, OBSERVED)
         if lost:
             hypotheses = pose_posterior(Pair(before, pair.model), diagnoser.reenactment, prior=False)
+        elif enactments:
+            found = [enactment.hypothesis for enactment in enactments]
+            hypotheses = np.array([hypothesis.T for hypothesis in found]), weights_of(found)
         else:
             hypotheses = search(pair, diagnoser.reenactment, surface)
         proposals = propose(clouds.source, surface, T, *hypotheses, refine, measure)

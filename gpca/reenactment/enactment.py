@@ -16,8 +16,7 @@ from gpca.causes.candidate import Candidate, Counterfactuals, Registrar, Unmeasu
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import LARGEST_ERROR, SUBSETS, shapley_values
 from gpca.pairs.distances import ObservedPair
-from gpca.reenactment.hypotheses import LAST_ITERATIONS, Hypothesis, find_hypotheses
-from gpca.reenactment.mixture import Mixture, densities_of
+from gpca.reenactment.hypotheses import Hypothesis, find_hypotheses, fits_at
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface, covered_points, trimmed_square
 from gpca.rigid import inverse, transform
@@ -138,16 +137,13 @@ def completed(surface: ModelSurface, observation: Observation) -> ModelSurface:
     return surface.completed(observation.points[observation.is_lone], observation.noise)
 
 
-def whole_surface(observed: np.ndarray, surface: ModelSurface, T: np.ndarray) -> ModelSurface:
-    """Return the surface as observed points (N, 3) at the likeliest pose complete it, by which errors are measured."""
-    mixture, densities_N = Mixture(surface.points, surface.spacing / 2), densities_of(observed, surface.points)
-    fits = mixture.fit(observed, T[None], LAST_ITERATIONS, moving=False, densities=densities_N)
-    matched_N, lone_N = fits.inlier_n_N[0], fits.lone_n_N[0]
-    hypothesis = Hypothesis(
-        T, matched_N + lone_N, float(fits.log_likelihood_n[0]), float(fits.width_n[0]), 1, 0, lone_N
-    )
+def observed_at(T: np.ndarray, observed: np.ndarray, surface: ModelSurface) -> Observation:
+    """Return what a pose, if it is true, says of observed points (N, 3)."""
+    fits = fits_at(T[None], observed, surface)
+    lone_N, width = fits.lone_n_N[0], float(fits.width_n[0])
+    hypothesis = Hypothesis(T, fits.inlier_n_N[0] + lone_N, float(fits.log_likelihood_n[0]), width, 1, 0, lone_N)
     random = generator("whole surface")
-    return completed(surface, observe(observed, hypothesis, surface, NoiseScale(surface, random), random))
+    return observe(observed, hypothesis, surface, NoiseScale(surface, random), random)
 
 
 def fresh_points(surface: ModelSurface, rows: np.ndarray, count: int, random: np.random.Generator) -> np.ndarray:

@@ -152,11 +152,13 @@ def hypothesis_at(
     random: np.random.Generator,
 ) -> Hypothesis:
     """Return a pose, as in :func:`find_hypotheses`, with the width and the outliers that are most likely there."""
-    mixture = Mixture(surface.points, surface.spacing / 2)
-    fits = mixture.fit(
-        observed, T[None], LAST_ITERATIONS, moving=False, densities=densities_of(observed, surface.points)
-    )
-    return _hypothesis(fits, 0, observed, surface, settings, random, None)
+    return _hypothesis(fits_at(T[None], observed, surface), 0, observed, surface, settings, random, None)
+
+
+def fits_at(T_n: np.ndarray, observed: np.ndarray, surface: ModelSurface) -> Fits:
+    """Return what the mixture says of poses (n, 4, 4) that stay: only widths and shares of outliers are estimated."""
+    mixture, densities = Mixture(surface.points, surface.spacing / 2), densities_of(observed, surface.points)
+    return mixture.fit(observed, T_n, LAST_ITERATIONS, moving=False, densities=densities)
 
 
 def search_ends(

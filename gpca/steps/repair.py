@@ -30,7 +30,7 @@ from gpca.io.csv_file import ANY, finite_number, numbers, read_csv, write_csv
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.model.proposed import Errors, Proposed, joined, pose_errors, propose_for
-from gpca.model.repair import Proposals, likely_errors, measured, search
+from gpca.model.repair import Proposals, measured, search
 from gpca.objects.canonical import BY_ICP, ObjectClouds
 from gpca.pairs.distances import ObservedPair
 from gpca.pairs.perturbation import CONCEPTS
@@ -231,7 +231,8 @@ def try_all(
         tried += [rival.by_function(name, function) for name, function in functions.items()]
         T_M = np.array([each.T for each in tried])
         fitness_M, rmse_M = measured(rival.before, pair.model, icp, moved)(T_M)
-        judged_M = likely_errors(rival.before, surface, T_M, T_K, weight_K)
+        assert proposals[-1].true_poses is not None
+        judged_M = proposals[-1].true_poses.errors(T_M)
         score_M_Q = np.array([each.score_Q for each in tried])
         columns.append((world.errors(row, T_M), *judged_M, rmse_M, fitness_M, score_M_Q))
         spent = {REPAIR: rival.repair_seconds} | {each.name: each.seconds for each in tried}

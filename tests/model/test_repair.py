@@ -16,8 +16,10 @@ from gpca.model.repair import (
     by_mixture,
     decide,
     difference,
+    inliers,
     measured,
     propose,
+    unseen,
 )
 from gpca.model.result import Calibrated, Evidence, ResultJudge, calibrated_at
 from gpca.reenactment.surface import ModelSurface
@@ -121,3 +123,18 @@ def test_the_handle_tells_two_poses_of_a_mug_apart(mug):
     assert part.direction[0] > 0.95
     assert 0.02 < part.share < 0.2
     assert 0.1 < distance < 0.3
+
+
+def test_points_on_surface_that_the_target_lacks_are_no_outliers_but_are_not_registered(mug):
+    lower = ModelSurface(mug.points[mug.points[:, 2] < 0.15])
+    outliers, missing = unseen(mug.points, lower, turned(0))
+    assert outliers < 0.05 and missing is None
+    [inlier_N] = inliers(mug.points, lower, turned(0)[None])
+    assert (inlier_N == (mug.points[:, 2] < 0.2)).mean() > 0.9
+
+
+def test_the_likelihood_is_not_misled_by_surface_that_the_target_lacks(mug):
+    half = ModelSurface(mug.points[mug.points[:, 0] < 0])
+    noisy = mug.points + np.random.default_rng(3).normal(0, 0.05, mug.points.shape)
+    [T] = by_mixture(half.points, half.spacing)(noisy, turned(4, 0.02)[None])
+    assert mug.errors(T[None])[0] < 0.025

@@ -51,14 +51,16 @@ def found(pair, surface, settings=SETTINGS):
 
 
 @pytest.mark.parametrize("causes", [(), ("noise",), ("pose",), ("overlap",), ("pose", "overlap")])
-def test_the_true_pose_is_the_most_probable(drill, causes):
-    candidate = candidate_of(drill, *causes, seed=103)
-    pair, T_true = pair_of(candidate)
-    surface = ModelSurface(candidate.model)
-    hypotheses = found(pair, surface)
-    assert surface.errors((hypotheses[0].T @ inverse(T_true))[None])[0] < 0.03
-    posterior = [hypothesis.log_posterior for hypothesis in hypotheses]
-    assert posterior == sorted(posterior, reverse=True) and posterior[0] - posterior[-1] < 4.5
+def test_the_true_pose_is_mostly_the_most_probable(drill, causes):
+    errors = []
+    for seed in (102, 103, 104):
+        pair, T_true = pair_of(candidate_of(drill, *causes, seed=seed))
+        surface = ModelSurface(pair.model)
+        hypotheses = found(pair, surface)
+        errors.append(surface.errors((hypotheses[0].T @ inverse(T_true))[None])[0])
+        posterior = [hypothesis.log_posterior for hypothesis in hypotheses]
+        assert posterior == sorted(posterior, reverse=True) and posterior[0] - posterior[-1] < 4.5
+    assert np.median(errors) < 0.02  # with so little left of a cloud, a single one may be off
 
 
 def test_where_the_model_lacks_surface_the_points_beyond_are_neither_outliers_nor_a_reason_for_another_pose(drill):
