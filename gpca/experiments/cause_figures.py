@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from textwrap import fill
 
 import numpy as np
 
@@ -71,6 +72,49 @@ def draw_causes_example(
     shown_error = f"{100 * causes.error_shown[row]:.1f} %"
     object_name = object_in_words(causes.registrations.object_name[row], dataset)
     write_title(figure, f"{title}: {object_name}. The registration shown to the explainers is off by {shown_error}")
+    return figure
+
+
+GALLERY_IN, LETTERS = 1.8, 44  # height of a row of failures with what explainers say, and letters of a line there
+
+
+def draw_failures(
+    objects_npz: Mapping[str, Path],
+    causes_npz: Mapping[str, Path],
+    predictions_csv: Paths,
+    explainers: Mapping[str, str],
+) -> Figure:
+    """Draw a failed test registration of each source (rows) and dominant cause (columns), with what explainers name.
+
+    Shown is the failure whose error is the median of its kind. Files are given by title of their source, explainers by
+    their titles.
+    """
+    size = (TEXT_WIDTH_IN, HEAD_IN + GALLERY_IN * len(causes_npz))
+    figure = use_style().figure(figsize=size, layout="constrained")
+    parts = figure.subfigures(len(causes_npz), 1, squeeze=False)[:, 0]
+    for title, part in zip(causes_npz, parts, strict=True):
+        part.supylabel(title)
+        panels = part.subplots(1, len(CONCEPTS))
+        causes, objects = Causes.load(causes_npz[title]), ObjectClouds.load(objects_npz[title])
+        files = [path for path in predictions_csv if Path(path).parents[1].name == causes_npz[title].parent.name]
+        failed_S = (causes.registrations.split == "test") & (causes.truth.state == FAILED)
+        for concept, panel in zip(CONCEPTS, panels, strict=True):
+            rows = np.flatnonzero(failed_S & (causes.truth.dominant == concept))
+            panel.set_axis_off()
+            if not len(rows):
+                write_below(panel, f"no failure by {concept}", fontsize=SMALL_PT)
+                continue
+            row = int(rows[np.argsort(causes.error_shown[rows], kind="stable")[len(rows) // 2]])
+            names, scores_R_4, verdicts = _scores(causes, row, files, explainers)
+            named = zip(names[1:], [LABELS[scores.argmax()] for scores in scores_R_4[1:]], verdicts[1:], strict=True)
+            answers: dict[str, list[str]] = {"right": [], "tie": [], "wrong": []}
+            for name, label, verdict in named:
+                answers[verdict].append(name if verdict == "right" else f"{name} ({label})")
+            words = [f"{concept}: {100 * causes.error_shown[row]:.0f} % off"]
+            words += [fill(f"{verdict}: {', '.join(who)}", LETTERS) for verdict, who in answers.items() if who]
+            clouds = {"\n".join(words): causes.registrations.cloud(row)}
+            _draw_over_solid(np.array([panel]), objects, causes, row, clouds, size=2.0)
+    write_title(figure, "Failed registrations, and what explainers name")
     return figure
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from math import inf
+from pathlib import Path
 from typing import Any
 
 from gpca.causes.judged import BINS, CEILING, joined, read_judged
@@ -12,7 +13,7 @@ from gpca.declarations.plan import Run
 from gpca.declarations.result import Frame, figure, table
 from gpca.evaluation.intervals import REPEATS
 from gpca.evaluation.measures import POOLED
-from gpca.experiments.cause_figures import draw_causes_example
+from gpca.experiments.cause_figures import draw_causes_example, draw_failures
 from gpca.experiments.confusions import draw_confusions
 from gpca.experiments.diagnosis import CAUSES_FILES, DIAGNOSES, cause_costs, cause_titles
 from gpca.explainers.interface import WORDS
@@ -94,6 +95,28 @@ def causes_example(run: Run, objects_npz, causes_npz, predictions_csv):
     titles = cause_titles(run.config)
     some = {name: titles[name] for name in (*COMPARED, "rule") if name in titles} or titles
     return draw_causes_example(objects_npz, causes_npz, predictions_csv, truth, some, *shown)
+
+
+IN_BRIEF = {"reenact": "re-enactment", "gpca": "GP-CA", "rule": "rule"}  # explainers of the gallery
+
+
+@figure(
+    SECTION,
+    "Failures, and what explainers name",
+    """A failed test registration of each dataset and each dominant cause, as ICP left it, with its error relative to
+    the diameter: of its kind, the one whose error is the median. Below stands who names the dominant cause, who one
+    that adds nearly as much (tie), and who another, which follows in brackets.""",
+    after="causes_example",
+    objects_files="objects/{source}.npz",
+    causes_files="causes/{source}/seed{first_seed}.npz",
+    predictions_csv="diagnoses/{source}/{cause_explainer}/seed{first_seed}.csv",
+)
+def failures(run: Run, objects_files, causes_files, predictions_csv):
+    objects = {run.source_titles[Path(path).stem]: Path(path) for path in objects_files}
+    causes = {run.source_titles[Path(path).parent.name]: Path(path) for path in causes_files}
+    titles = cause_titles(run.config)
+    some = {name: words for name, words in IN_BRIEF.items() if name in titles} or dict(list(titles.items())[:3])
+    return draw_failures(objects, causes, list(predictions_csv), some)
 
 
 @table(

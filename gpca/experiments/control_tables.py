@@ -201,7 +201,8 @@ def loophole(run: Run, intervals) -> Figure:
     panel.axhline(100 / 3, color=style.GRAY, lw=0.8, ls=":")
     panel.set_xticks(range(len(STEPS)), STEPS.values())
     panel.set(xlim=(-0.45, len(STEPS) - 0.55), ylim=(0, 104), ylabel="accuracy (%)")
-    legend_below(drawing, *panel.get_legend_handles_labels(), columns=2, fontsize=SMALL_PT)
+    handles, labels = panel.get_legend_handles_labels()
+    legend_below(drawing, handles, labels, columns=2, fontsize=SMALL_PT)
     style.write_title(drawing, "All together" if source == POOLED else run.source_titles[source])
     return drawing
 

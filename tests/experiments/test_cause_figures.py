@@ -12,12 +12,15 @@ from gpca.experiments.cause_figures import (
     _draw_scores,
     _draw_waterfall,
     draw_causes_example,
+    draw_failures,
     is_clear,
     usual_failure,
 )
 from gpca.objects.canonical import write_objects
 from gpca.objects.procedural import surfaces
+from gpca.pairs.perturbation import CONCEPTS
 from tests.conftest import FEW_CAUSES, FOUR
+from tests.figures import words_of
 from tests.judged import write_run
 
 
@@ -72,10 +75,28 @@ def test_the_bars_of_a_waterfall_begin_where_others_end_and_add_up(causes):
     plt.close(figure)
 
 
+def objects_in(folder):
+    objects = folder / "four.npz"
+    write_objects((surface for surface in surfaces("ycb") if surface.name in FOUR), "four", objects, n_points=6000)
+    return objects
+
+
+def test_a_failure_of_each_cause_is_shown_with_who_names_it(causes, tmp_path):
+    predictions, [truth] = write_run(tmp_path, causes)
+    figure = draw_failures({"Four": objects_in(tmp_path)}, {"Four": truth}, predictions, {"right": "all-knowing"})
+    failed = (causes.registrations.split == "test") & (causes.truth.state == FAILED)
+    words = {text for text in words_of(figure) if " off" in text or "no failure" in text}
+    assert len(words) == len(CONCEPTS)
+    for concept in CONCEPTS:
+        errors = np.sort(causes.error_shown[failed & (causes.truth.dominant == concept)])
+        shown = f"{concept}: {100 * errors[len(errors) // 2]:.0f} % off" if len(errors) else f"no failure by {concept}"
+        [caption] = [each for each in words if each.startswith(shown)]
+        assert not len(errors) or "right: all-knowing" in caption
+
+
 def test_the_figure_is_the_same_bytes_each_time(causes, tmp_path, same_bytes):
     predictions, [truth] = write_run(tmp_path, causes)
-    objects = tmp_path / "four.npz"
-    write_objects((surface for surface in surfaces("ycb") if surface.name in FOUR), "four", objects, n_points=6000)
+    objects = objects_in(tmp_path)
     same_bytes(
         lambda: draw_causes_example(
             objects, truth, predictions, CauseSettings(**FEW_CAUSES), {"right": "Right"}, "Four"
