@@ -96,7 +96,7 @@ def promise(guarantee: Guaranteed | None) -> str:
         f"It was calibrated {guarantee.basis}."
         if guarantee.labeled
         else f"It was calibrated on {guarantee.families} families of shapes that the classifier had not learned, and "
-        "holds for objects that are to those of the training as these are to one another."
+        "holds for objects that differ from these no more than these differ among themselves."
         if guarantee.families
         else "It was calibrated on single registrations of objects that the classifier had not learned."
     )

@@ -88,8 +88,17 @@ class Scene:
             {"T": flat(pose.T), "what_ifs": [packed(pose.clouds[subset]) for subset in BY_SIZE]}
             for pose in self.possibilities
         ] or [{"T": flat(T), "what_ifs": []} for T in self.T_others]
-        repaired = {} if self.T_repaired is None else {"repaired": flat(self.T_repaired)}
-        return pair | {"poses": poses} | repaired
+        return pair | {"poses": poses} | self._compared()
+
+    def _compared(self) -> dict[str, object]:
+        """The view that is drawn beside others: the repaired pose, or the likeliest pose if it is another one."""
+        if self.T_repaired is not None:
+            return {"repaired": flat(self.T_repaired), "beside": "repaired"}
+        T_poses = [pose.T for pose in self.possibilities] or self.T_others
+        if not len(T_poses):
+            return {}
+        moved = transform(T_poses[0], self.source) - self.aligned
+        return {"beside": "pose:0"} if np.linalg.norm(moved, axis=1).mean() > self.limit else {}
 
 
 def packed_pair(
@@ -100,13 +109,13 @@ def packed_pair(
     Lengths are in diameters of the target, except ``diameter`` itself, which is in `unit`. `T_found` maps the source
     from its initial pose to the result; from the distance `reach` on, all points get the same color.
     """
-    radii = [np.linalg.norm(points, axis=1) for points in (target, source, transform(T_found, source))]
+    radii = [np.linalg.norm(points, axis=1) for points in (target, transform(T_found, source))]
     radius = max(float(np.quantile(radius, 0.98)) for radius in radii)  # a few far points are ignored
     return {
         "unit": unit,
         "diameter": diameter,
         "reach": reach,
-        "radius": float(np.clip(radius, 0.5, FARTHEST)),
+        "radius": float(np.clip(radius, 0.4, FARTHEST)),
         "target": packed(target),
         "source": packed(source),
         "found": flat(T_found),

@@ -10,7 +10,7 @@ import pytest
 
 from gpca.causes.truth import ALL, BY_SIZE
 from gpca.model.scene import MOST_POINTS, packed, taken_out
-from gpca.rigid import transform
+from gpca.rigid import rigid_motion, transform
 
 from ..page.test_in_a_browser import chromium, in_a_browser, with_script
 
@@ -104,6 +104,15 @@ def test_one_of_many_has_no_view_and_an_unknown_one_no_poses(explainer, pair):
     assert "The state of this registration is unknown" in page
     assert 'data-view="pose:0"' not in page
     assert "<canvas" in page
+
+
+def test_the_repaired_or_a_likelier_pose_is_drawn_beside_the_result(explained):
+    scene = explained.scene
+    assert replace(scene, T_repaired=np.eye(4)).packed("m")["beside"] == "repaired"
+    T_likeliest = scene.possibilities[0].T
+    T_apart = rigid_motion(np.eye(3), [2 * scene.limit, 0, 0]) @ T_likeliest
+    for T_found, beside in ((T_likeliest, None), (T_apart, "pose:0")):
+        assert replace(scene, T_found=T_found).packed("m").get("beside") == beside
 
 
 def test_a_fast_or_undiagnosed_one_has_its_page(explainer, pair):

@@ -1,7 +1,7 @@
 "use strict";
 
-// Two clouds on a plain canvas: the target, and the source in the pose that was chosen; where it was repaired, the same
-// beside it in the repaired pose.
+// Two clouds on a plain canvas: the target, and the source in the pose that was chosen; beside it in the repaired pose,
+// or in the likeliest one where that is another.
 function openView() {
   const canvas = document.getElementById("view");
   const context = canvas.getContext("2d");
@@ -97,7 +97,7 @@ function openView() {
       + `${length(scene.reach)} of it.`;
   }
 
-  const views = () => (scene.repaired ? [shown, "repaired"] : [shown]);
+  const views = () => (scene.beside && scene.beside !== shown ? [shown, scene.beside] : [shown]);
 
   function draw() {
     const ratio = window.devicePixelRatio || 1;
@@ -113,7 +113,7 @@ function openView() {
       context.rect(0, 0, wide, height);
       context.clip();
       drawView(view, wide, height, ratio);
-      if (scene.repaired) {
+      if (scene.beside) {
         context.fillStyle = "#1a1a1a";
         context.font = `${13 * ratio}px system-ui, sans-serif`;
         context.fillText(title(view), 10 * ratio, 20 * ratio, wide - 20 * ratio);
@@ -182,7 +182,8 @@ function openView() {
     redraw();
   }
 
-  // One finger or the mouse turns, two fingers or the wheel zoom.
+  // The mouse turns, and so does a finger that moves sideways: up and down scrolls the page. Two fingers, or the wheel
+  // with Ctrl, zoom.
   const fingers = new Map();
   function apart() {
     const [a, b] = [...fingers.values()];
@@ -205,6 +206,7 @@ function openView() {
     canvas.addEventListener(end, (event) => fingers.delete(event.pointerId));
   }
   canvas.addEventListener("wheel", (event) => {
+    if (!event.ctrlKey && !event.metaKey) return;
     event.preventDefault();
     zoom(Math.exp(-0.0015 * event.deltaY));
   }, { passive: false });
@@ -246,6 +248,7 @@ function openView() {
     const pose = scene.poses[k];
     const there = kind === "what" ? pose && pose.what_ifs.length : k === undefined || pose;
     choose(there ? shown : "found");
+    box.classList.toggle("two", Boolean(scene.beside));
     color();
   }
 
