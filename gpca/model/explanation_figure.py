@@ -1,46 +1,86 @@
 """Draws one explanation in one look: both clouds, the causes, what would have been without them, and what to do."""
 
 from pathlib import Path
-from textwrap import fill, wrap
+from textwrap import wrap
 
 import numpy as np
 
-from gpca.causes.truth import BY_SIZE
+from gpca.causes.truth import BY_SIZE, SUBSETS
 from gpca.model.explanation import Explanation
-from gpca.model.scene import taken_out
+from gpca.model.scene import Scene, taken_out
 from gpca.numerals import in_decimals
 from gpca.reporting.figures import style
 from gpca.reporting.figures.cloud_views import thinned, widest_views
 from gpca.rigid import transform
 
-HEIGHT_IN = 5.0
+VIEW_IN, BAR_IN, BELOW_IN = 2.2, 0.95, 2.0  # width of a view; heights of what stands around the views, and below them
 POINTS = 1500  # of each cloud; more hide one another
 BRIGHTEST = 0.8  # of viridis; what is brighter is lost on white
-LETTERS = 40  # in a line of text
-MOST_LINES = 14
+OUTSIDE = 0.01  # share of the points after the registration that the panels may leave out
+LETTERS = 46  # in a line of text
+MOST_LINES = 12
+ROWS = [subset for subset in BY_SIZE if len(SUBSETS[subset]) in (0, 2, 3)]  # all causes, one of them gone, none
 
 
 def draw_explanation(explanation: Explanation, png_path: str | Path, names: str = "") -> None:
-    """Write one explanation as a PNG of 300 dpi; `names` of the files are its title.
+    """Write one explanation as a PNG of 200 dpi; `names` of the files are its title.
 
     Raises ValueError for an explanation without a scene.
     """
+    if (scene := explanation.scene) is None:
+        raise ValueError("an explanation that came as one of many has no clouds to draw")
+    views = _views(explanation, scene)
+    view = widest_views(scene.target)[0]
+    found = np.concatenate([cloud for _, cloud in views[1:]]) @ view.T
+    outer = np.concatenate([scene.target @ view.T, np.quantile(found, (OUTSIDE, 1 - OUTSIDE), axis=0)])[:, :2]
+    margin = 0.02 * np.ptp(outer, axis=0).max()
+    corners_2_2 = np.stack([outer.min(axis=0) - margin, outer.max(axis=0) + margin], axis=1)
+    wide, high = np.ptp(corners_2_2, axis=1)
+    above_in = BAR_IN + VIEW_IN * min(high / wide, 1.2)
+    figure = style.use_style().figure(figsize=(style.TEXT_WIDTH_IN, above_in + BELOW_IN), layout="constrained")
+    above, below = figure.subfigures(2, 1, height_ratios=(above_in, BELOW_IN))
+    _draw_views(above, explanation, scene, views, view, corners_2_2)
+    left, middle, right = below.subplots(1, 3, width_ratios=(1, 1, 1.3))
+    _draw_causes(left, explanation)
+    if scene.possibilities:
+        _draw_what_ifs(middle, scene, explanation.unit)
+    else:
+        middle.set_axis_off()
+    wrapped = [part for line in _lines(explanation) for part in wrap(line, LETTERS, subsequent_indent="   ")]
+    text = "\n".join(wrapped[:MOST_LINES] + ["…"] * (len(wrapped) > MOST_LINES))
+    look = {"va": "top", "ha": "left", "fontsize": style.SMALL_PT, "linespacing": 1.4, "in_layout": False}
+    right.set_axis_off()
+    right.text(0, 1, text, transform=right.transAxes, parse_math=False, **look)
+    style.write_title(figure, names)
+    style.save_png(figure, png_path, dpi=200)
+
+
+def _views(explanation: Explanation, scene: Scene) -> list[tuple[str, np.ndarray]]:
+    """Return the source before and after the registration, and in the repaired or another likely pose, with titles."""
+    views = [("before", scene.source), ("after", scene.aligned)]
+    if scene.T_repaired is not None:
+        return [*views, ("repaired", transform(scene.T_repaired, scene.source))]
+    if explanation.diagnosis and not explanation.unknown:
+        poses = zip(explanation.diagnosis.reenacted.poses, scene.possibilities, strict=True)
+        for other in [possibility for pose, possibility in poses if not pose.registered][:1]:  # the most probable
+            views.append((f"another pose (probability {other.probability:.2f})", transform(other.T, scene.source)))
+    return views
+
+
+def _draw_views(
+    figure,
+    explanation: Explanation,
+    scene: Scene,
+    views: list[tuple[str, np.ndarray]],
+    view: np.ndarray,
+    corners_2_2: np.ndarray,
+) -> None:
+    """Draw the source over the target in each view at one scale, colored by its distance to the target."""
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
     from scipy.spatial import cKDTree
 
-    if (scene := explanation.scene) is None:
-        raise ValueError("an explanation that came as one of many has no clouds to draw")
-    diagnosis = explanation.diagnosis
-    figure = style.use_style().figure(figsize=(style.TEXT_WIDTH_IN, HEIGHT_IN), layout="constrained")
-    above, below = figure.subfigures(2, 1, height_ratios=(1.15, 1))
-    views = [("before", scene.source), ("after", scene.aligned)]
-    if diagnosis and not explanation.unknown:
-        poses = zip(diagnosis.reenacted.poses, scene.possibilities, strict=True)
-        for other in [possibility for pose, possibility in poses if not pose.registered][:1]:  # the most probable
-            views.append((f"another pose (probability {other.probability:.2f})", transform(other.T, scene.source)))
-    panels = above.subplots(1, len(views), squeeze=False)[0]
-    view = widest_views(scene.target)[0]
+    panels = figure.subplots(1, len(views), squeeze=False)[0]
     colors = ListedColormap(colormaps["viridis"](np.linspace(BRIGHTEST, 0, 256)))
     look = {"cmap": colors, "vmin": 0, "vmax": scene.reach * scene.frame.diameter, "linewidths": 0}
     target = thinned(scene.target, POINTS) @ view.T
@@ -51,33 +91,40 @@ def draw_explanation(explanation: Explanation, png_path: str | Path, names: str 
         ahead = (source @ view.T)[order]
         panel.scatter(target[:, 0], target[:, 1], s=1, c=style.LIGHT_GRAY, linewidths=0)
         shown = panel.scatter(ahead[:, 0], ahead[:, 1], s=2, c=far, **look)
-        panel.set(aspect="equal")
+        panel.set(aspect="equal", xlim=corners_2_2[0], ylim=corners_2_2[1])
         panel.set_axis_off()
         panel.set_title(title)
     label = f"distance to the target ({explanation.unit})"
-    bar = above.colorbar(shown, ax=panels, location="right", shrink=0.8, extend="max", label=label)
+    bar = figure.colorbar(shown, ax=panels, location="bottom", shrink=0.5, aspect=50, extend="max", label=label)
     bar.outline.set_linewidth(0.4)
-    left, middle, right = below.subplots(1, 3)
-    # Without a diagnosis, the scores of GP-CA stand for the probabilities of the causes.
+
+
+def _draw_causes(panel, explanation: Explanation) -> None:
+    """Draw the probability of each cause; without a diagnosis, the scores of GP-CA stand for them."""
+    diagnosis = explanation.diagnosis
     shares = diagnosis.causes if diagnosis else explanation.scores
     variances = diagnosis.variances if diagnosis else explanation.variances
-    deviations = [float(np.sqrt(variances[name])) for name in shares]
-    bar_colors = [style.CONCEPT_COLORS.get(name, style.LIGHT_GRAY) for name in shares]
-    bars = {"xerr": deviations, "color": bar_colors, "height": 0.6, "error_kw": {"elinewidth": 0.8}}
-    left.barh(np.arange(len(shares))[::-1], [*shares.values()], **bars)
-    effects = diagnosis.reenacted.effects if diagnosis else {}
-    added = {name: f"\n{in_decimals(effect)} {explanation.unit}" for name, effect in effects.items()}
-    labels = [f"{name}{added.get(name, '')}" for name in shares]
-    left.set_yticks(np.arange(len(shares))[::-1], labels)
-    left.set(xlim=(0, 1), xlabel="probability", title="causes, if it failed, and what each adds")
-    if scene.possibilities:
-        errors = [scene.frame.diameter * scene.possibilities[0].errors[subset] for subset in BY_SIZE]
-        middle.barh(np.arange(len(errors)), errors, color=style.BLUE, height=0.6)
-        middle.axvline(scene.limit * scene.frame.diameter, color=style.VERMILION, linewidth=0.8)
-        middle.set_yticks(np.arange(len(errors)), [fill(taken_out(subset), 26) for subset in BY_SIZE])
-        middle.set(xlabel=f"re-enacted error ({explanation.unit})", title="what if?")
-    else:
-        middle.set_axis_off()
+    share_C, deviation_C = np.array([*shares.values()]), np.sqrt([variances[name] for name in shares])
+    spread_2_C = np.stack([np.minimum(deviation_C, share_C), np.minimum(deviation_C, 1 - share_C)])
+    colors = [style.CONCEPT_COLORS.get(name, style.LIGHT_GRAY) for name in shares]
+    place_C = np.arange(len(shares))[::-1]
+    panel.barh(place_C, share_C, xerr=spread_2_C, color=colors, height=0.6, error_kw={"elinewidth": 0.8})
+    panel.set_yticks(place_C, [*shares])
+    panel.set(xlim=(0, 1.02), xlabel="probability of a cause, if it failed")
+
+
+def _draw_what_ifs(panel, scene: Scene, unit: str) -> None:
+    """Draw the re-enacted errors with all causes, without each and without any, and the limit of a failure."""
+    errors = [scene.frame.diameter * scene.possibilities[0].errors[subset] for subset in ROWS]
+    panel.barh(np.arange(len(errors)), errors, color=style.BLUE, height=0.6)
+    panel.axvline(scene.limit * scene.frame.diameter, color=style.VERMILION, linewidth=0.8)
+    words = ["All of these" if not SUBSETS[subset] else taken_out(subset) for subset in ROWS]
+    panel.set_yticks(np.arange(len(errors)), words)
+    panel.set_xlabel(f"re-enacted error ({unit})")
+
+
+def _lines(explanation: Explanation) -> list[str]:
+    diagnosis = explanation.diagnosis
     if explanation.unknown:
         lines = ["state: unknown"]
     elif diagnosis is None:
@@ -88,11 +135,4 @@ def draw_explanation(explanation: Explanation, png_path: str | Path, names: str 
         lines.append(f"off by more than {tolerance} with probability {diagnosis.result:.2f}")
         lines += [" ".join(line.split()) for line in (diagnosis.guarantee.lines() if diagnosis.guarantee else [])]
     lines.append(f"action: {explanation.advice} ({explanation.reason})")
-    lines += [f"warning: {warning}" for warning in explanation.warnings]
-    wrapped = [part for line in lines for part in wrap(line, LETTERS, subsequent_indent="   ")]
-    text = "\n".join(wrapped[:MOST_LINES] + ["…"] * (len(wrapped) > MOST_LINES))
-    text_look = {"va": "top", "ha": "left", "fontsize": style.SMALL_PT, "linespacing": 1.4, "in_layout": False}
-    right.set_axis_off()
-    right.text(0, 1, text, transform=right.transAxes, parse_math=False, **text_look)
-    style.write_title(figure, names)
-    style.save_png(figure, png_path)
+    return lines + [f"warning: {warning}" for warning in explanation.warnings]
