@@ -17,7 +17,7 @@ from gpca.numerals import in_decimals
 from gpca.objects.bop import symmetric_turn
 from gpca.objects.canonical import CanonicalFrame
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reenactment.enactment import Enactment
+from gpca.reenactment.enactment import QUIET, Enactment
 from gpca.reenactment.hypotheses import SAME
 from gpca.reenactment.scale import Scale, find_scale
 from gpca.reenactment.surface import ModelSurface
@@ -196,6 +196,7 @@ class Reenacted:
     poses: tuple[FittingPose, ...]  # the hypotheses, most probable first
     undetermined: Undetermined | None = None  # directions in which the most probable pose is free
     scale: Scale | None = None  # of the source relative to the target
+    noise_floor: float = QUIET  # noise up to this is taken for none, as the target's own sampling may make it
 
     @classmethod
     def of(
@@ -244,7 +245,7 @@ class Reenacted:
         undetermined = self.undetermined and self.undetermined.outside(frame)
         scale = self.scale and replace(self.scale, **in_unit_of(frame, self.scale, "error"))
         parts: dict[str, Any] = {"effects": effects, "poses": poses, "undetermined": undetermined, "scale": scale}
-        return replace(self, **parts, **in_unit_of(frame, self, "error", "noise"))
+        return replace(self, **parts, **in_unit_of(frame, self, "error", "noise", "noise_floor"))
 
     def as_dict(self) -> dict[str, object]:
         """Values for JSON."""
@@ -254,6 +255,12 @@ class Reenacted:
         """Describe each hypothesis relative to the result, such as ``the object also fits moved by 20 mm``."""
         verbs = ["fits", *["also fits"] * (len(self.poses) - 1)]
         return [f"{subject} {pose.words(unit, fits)}" for fits, pose in zip(verbs, self.poses, strict=True)]
+
+    def noise_words(self, unit: str) -> str:
+        """The noise per axis, or what it is below."""
+        if self.noise <= self.noise_floor:
+            return f"below {in_decimals(self.noise_floor)} {unit}"
+        return f"{in_decimals(self.noise)} {unit}"
 
     def effects_line(self, unit: str) -> str:
         """One line of text on the effects of the causes."""
@@ -278,7 +285,7 @@ class Reenacted:
     def lines(self, unit: str) -> list[str]:
         """Lines of text."""
         parts = f"{self.outliers:.0%} outliers, {self.missing:.0%} of the surface missing"
-        observed = f"observed  noise of {in_decimals(self.noise)} {unit}, {parts}"
+        observed = f"observed  noise {self.noise_words(unit)}, {parts}"
         return [self.effects_line(unit), observed, *self.fit_lines(unit), *self.pose_lines("the object", unit)]
 
 

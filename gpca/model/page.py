@@ -135,7 +135,7 @@ def poses(reenacted: Reenacted, subject: str, unit: str, *, observation: bool = 
         for k, (words, pose) in enumerate(zip(reenacted.words(subject, unit), reenacted.poses, strict=True))
     )
     note = (
-        f'<p class="note">Under pose 1, the noise is {escape(length(reenacted.noise, unit))} per axis, '
+        f'<p class="note">Under pose 1, the noise is {escape(reenacted.noise_words(unit))} per axis, '
         f"{reenacted.outliers:.0%} of the points are outliers, and {reenacted.missing:.0%} of the surface was not "
         "seen.</p>"
     )

@@ -92,7 +92,8 @@ def test_effects_add_up_and_lengths_are_in_the_users_unit(drill):
     assert outside.effects["pose"] == pytest.approx(10 * found.effects["pose"])
     first, second = outside.lines("mm")[:2]
     assert first == "effects   on the re-enacted error of 0.7 mm: noise 0.1, pose 0.2, overlap 0.4"
-    assert second == "observed  noise of 0.2 mm, 25% outliers, 50% of the surface missing"
+    assert second == "observed  noise 0.2 mm, 25% outliers, 50% of the surface missing"
+    assert replace(outside, noise=0.04).lines("mm")[1].startswith("observed  noise below 0.04 mm, ")
 
 
 def test_a_pose_takes_the_users_source_to_the_users_target(drill):
