@@ -1,6 +1,7 @@
 """What a re-enactment says to a user: other poses in plain words, and what each cause does."""
 
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
