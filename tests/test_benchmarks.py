@@ -348,7 +348,7 @@ def test_causes_end_with_the_seconds_of_a_truth_and_the_shares_of_the_states(cap
 
 
 def test_an_encoder_has_converged_where_no_longer_training_is_better(tmp_path, capsys):
-    """Of two seeds; the row of a training that is there is not computed again."""
+    """Of two seeds, in accuracy or in loss; the row of a training that is there is not computed again."""
     from benchmarks import convergence
 
     by_epochs = {3: (0.70, 0.80), 6: (0.90, 0.93), 12: (0.91, 0.92), 24: (0.90, 0.93)}
@@ -363,13 +363,23 @@ def test_an_encoder_has_converged_where_no_longer_training_is_better(tmp_path, c
     out = capsys.readouterr().out
     assert last_line(out) == {"converged_dgcnn": 6}
     assert "75.0" in out  # mean accuracy after 3 epochs
+    page = tmp_path / "page.md"
+    page.write_text("<!-- times of convergence -->\n<!-- end of convergence -->\n")
+    falling = [row | {"loss": str({3: 0.9, 6: 0.5, 12: 0.3, 24: 0.26}[int(row["epochs"])])} for row in rows]
+    convergence.write_rows(tmp_path / "falling.csv", falling)
+    convergence.main(["--out", str(tmp_path / "falling.csv"), "--write", str(page)])
+    assert last_line(capsys.readouterr().out) == {"converged_dgcnn": 12}
+    assert "| dgcnn | **12** | 2 | 0.300 | 91.5 |" in page.read_text()
+    assert (tmp_path / "convergence.png").is_file()
     convergence.write_rows(tmp_path / "rows.csv", rows[:4])
     convergence.main(["--out", str(tmp_path / "rows.csv")])
     assert last_line(capsys.readouterr().out) == {"converged_dgcnn": None}
 
 
-def test_convergence_trains_and_judges_an_encoder(tmp_path, registrations):
+def test_convergence_trains_and_judges_an_encoder(tmp_path, registrations, monkeypatch):
     from benchmarks import convergence
+
+    monkeypatch.setattr(convergence, "CHECKPOINTS", tmp_path)
 
     registrations.save(tmp_path / "ycb/seed100.npz", ("ycb", 100))
     out = tmp_path / "rows.csv"

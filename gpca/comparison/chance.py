@@ -49,8 +49,9 @@ def chance(comparison: Frame, tolerances: Mapping[str, Tolerance]) -> dict[str, 
             upper = row.published if math.isnan(row.upper) else row.upper
             low, high = (row.published, upper) if math.isnan(row.paper_low) else (row.paper_low, row.paper_high)
             stated = Printed(row.published, upper, 0.5 * 10.0**-row.decimals, low, high)
-            bounds = (run.ci_low, run.ci_high, int(run.n), bool(run.at_least), run.cluster_low, run.cluster_high)
-            value = Reproduced(run.reproduced, *bounds).times(UNITS[row.unit].factor / UNITS[run.unit].factor)
+            to_unit = UNITS[row.unit].factor / UNITS[run.unit].factor
+            mean, low, high = (to_unit * value for value in (run.reproduced, run.ci_low, run.ci_high))
+            value = Reproduced(mean, low, high, int(run.n), bool(run.at_least))
             verdict = verdicts.verdict_of(stated, value, tolerances[row.unit])
             fits_K_K[i, j] = verdict in (verdicts.REPRODUCED, verdicts.CLOSE)
         random = generator("verdicts by chance", table, column)

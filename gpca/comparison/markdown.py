@@ -5,12 +5,12 @@ from collections.abc import Iterable, Mapping
 
 from gpca.comparison.chance import ALL, SHUFFLES, chance
 from gpca.comparison.published import HARDWARE, TABLES, TEXT
-from gpca.comparison.verdicts import VERDICTS, Tolerance, counts, judged_once
+from gpca.comparison.verdicts import DECIDED, PAPER_TOO_WIDE, VERDICTS, Tolerance, counts, judged_once
 from gpca.io.frame import Frame
 from gpca.objects.entry import STAND_IN
 from gpca.reporting.tables.table import EMPTY
 
-_HEADS = ("Row", "Column", "Unit", "Paper", "Here", "Over objects", "n", "Difference", "Verdict")
+_HEADS = ("Row", "Column", "Unit", "Paper", "Here", "Over objects", "n", "n needed", "Difference", "Verdict")
 _CHANCE = ("by chance", "p", "ρ")
 
 
@@ -30,8 +30,10 @@ def comparison_markdown(comparison: Frame, tolerances: Mapping[str, Tolerance]) 
     parts.append(
         f"Reproduced: the mean here is within {near} of the printed number, or the 95 % interval of the difference "
         f"contains 0. Close: within {far}. Inconclusive: the interval, which includes the paper's own sampling error "
-        "where known, reaches beyond what is close, but does not lie beyond it as a whole. docs/comparison.md has the "
-        "whole rule."
+        "where known, reaches beyond what is close, but does not lie beyond it as a whole; n needed is the number of "
+        "seeds with the same mean and spread that would decide. Intervals are over seeds and samples with the objects "
+        "fixed, as those of a printed number are; what holds over objects stands beside them, and the counts say what "
+        "the verdicts would be by the farther bounds of both. docs/comparison.md has the whole rule."
     )
     parts.append(f"Times of the paper were measured on {' and '.join(HARDWARE.values())}.")
     for table, rows in comparison.groupby("table", sort=False):
@@ -45,13 +47,18 @@ def comparison_markdown(comparison: Frame, tolerances: Mapping[str, Tolerance]) 
 
 
 def summary(comparison: Frame) -> str:
-    """Return the counts: means, each value once, by verdict; standard deviations and repeats apart."""
+    """Return the counts: means, each value once, decided or not; standard deviations and repeats apart."""
     once, deviations, repeats = _parts(comparison)
+    is_decided = once["verdict"].isin(DECIDED)
 
     def in_words(rows: Frame) -> str:
         return ", ".join(f"{count} {verdict}" for verdict, count in counts(rows).items() if count)
 
-    sentences = [f"Of {len(comparison)} printed numbers, {len(once)} are means, each judged once: {in_words(once)}."]
+    parts = [f"{is_decided.sum()} decided ({in_words(once[is_decided])})"] if is_decided.any() else []
+    parts += [in_words(once[~is_decided])] if not is_decided.all() else []
+    sentences = [f"Of {len(comparison)} printed numbers, {len(once)} are means, each judged once: {', '.join(parts)}."]
+    if by_paper := (once["reason"] == PAPER_TOO_WIDE).sum():
+        sentences.append(f"No run can decide {by_paper} of the latter, as the paper's own interval is too wide.")
     if len(deviations):
         sentences.append(f"{len(deviations)} are standard deviations: {in_words(deviations)}.")
     if len(repeats):
@@ -76,6 +83,8 @@ def counts_table(comparison: Frame, tolerances: Mapping[str, Tolerance]) -> str:
     for table, rows in once.groupby("table", sort=False):
         lines.append([_name(table), *(count or "" for count in counts(rows).values()), *cells(table)])
     lines.append(["All", *counts(once).values(), *cells(ALL)])
+    over_objects = counts(once.assign(verdict=once["over_objects"]))
+    lines.append(["All, by intervals over objects too", *(count or "" for count in over_objects.values()), "", "", ""])
     for name, rows in (("Standard deviations", deviations), ("Repeats", repeats)):
         if len(rows):
             lines.append([name, *(count or "" for count in counts(rows).values()), "", "", ""])
@@ -101,8 +110,8 @@ def _joined(lines: Iterable[Iterable]) -> str:
 
 
 def _table(rows: Frame, number_of: Mapping[str, int]) -> str:
-    lines = [list(_HEADS), [":--"] * 3 + ["--:"] * 5 + [":--"]]
-    for row in rows.itertuples():
+    lines = [list(_HEADS), [":--"] * 3 + ["--:"] * 6 + [":--"]]
+    for row in rows.fillna({"n_needed": 0}).itertuples():
         mark = f" [{number_of[row.reason]}]" if row.reason else ""
         if row.repeat_of:
             table, _, cell = row.repeat_of.partition(" / ")
@@ -122,7 +131,8 @@ def _table(rows: Frame, number_of: Mapping[str, int]) -> str:
         if not math.isnan(row.cluster_low):
             over_objects = f"{_digits(row.cluster_low, row)} to {_digits(row.cluster_high, row)}"
         verdict = f"**{row.verdict}**" if row.verdict == VERDICTS[0] else row.verdict
-        cells = (row.row, row.column, row.unit, printed, here, over_objects, n, difference, verdict + mark)
+        needed = f"{row.n_needed:.0f}" if row.n_needed else EMPTY
+        cells = (row.row, row.column, row.unit, printed, here, over_objects, n, needed, difference, verdict + mark)
         lines.append([cell.replace("|", "\\|") for cell in cells])
     return _joined(lines)
 

@@ -21,16 +21,17 @@ class Unit(NamedTuple):
     factor: float
     least: float = 0.0
     most: float = math.inf
+    ratio: bool = False  # values are compared by their ratio, so an interval is one of the logarithm
 
 
 UNITS = {
     "%": Unit(100, most=100),
-    "labels": Unit(1),
-    "epochs": Unit(1),
-    "s": Unit(1),
-    "ms": Unit(1000),
+    "labels": Unit(1, ratio=True),
+    "epochs": Unit(1, ratio=True),
+    "s": Unit(1, ratio=True),
+    "ms": Unit(1000, ratio=True),
     "correlation": Unit(1, -1, 1),
-    "risk": Unit(1, most=1),  # area under risk and coverage
+    "risk": Unit(1, most=1, ratio=True),  # area under risk and coverage
     "share": Unit(1, most=1),
 }
 TIMES = ("s", "ms")

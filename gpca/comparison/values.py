@@ -1,8 +1,8 @@
-"""The run's value beside each printed number: its interval over seeds, and over clusters of samples and seeds.
+"""The run's value beside each printed number: its interval over seeds and samples, and over clusters of samples.
 
-Seeds share objects, so their interval does not show how much the choice of objects matters; objects of one family or
-scene are alike (:mod:`gpca.objects.canonical`). The bootstrap over clusters needs predictions of single samples, which
-a run keeps for shares of samples only.
+The first holds for the given objects and decides a verdict. The other shows how much the choice of objects matters, of
+which those of one family or scene are alike (:mod:`gpca.objects.canonical`); it needs predictions of single samples,
+which a run keeps for shares of samples only.
 """
 
 from __future__ import annotations
@@ -19,8 +19,16 @@ import numpy as np
 from gpca.active_learning.curves import CENSORED_BY
 from gpca.attribution.metrics import PREDICTED_AS
 from gpca.attribution.predictions import read_predictions
-from gpca.comparison.published import UNITS, Counterpart, Number
-from gpca.evaluation.intervals import LEVEL, Clustered, interval, mean_interval, student_factor, weighted_mean
+from gpca.comparison.published import UNITS, Counterpart, Number, Unit
+from gpca.evaluation.intervals import (
+    LEVEL,
+    NO_WIDTH,
+    Clustered,
+    interval,
+    student_factor,
+    weighted_mean,
+    wilson_interval,
+)
 from gpca.evaluation.measures import ALL, read_metrics, source_method_seed
 from gpca.evaluation.runtime_file import read_runtime
 from gpca.jobs.provenance import read_record
@@ -35,25 +43,45 @@ Folder = tuple[str, str, str]  # e.g. ("predictions", "ycb", "gpca_paper")
 
 @dataclass(frozen=True)
 class Reproduced:
-    """A run's value."""
+    """A run's value, in the unit of the printed one."""
 
     value: float
-    low: float  # 95 % interval over the repeats; NaN where there is none
+    low: float  # 95 % interval over the repeats and their samples, with the objects fixed; NaN where there is none
     high: float
     n: int  # repeats
     at_least: bool = False  # the value is a lower bound
     cluster_low: float = math.nan  # 95 % interval over clusters and seeds; NaN without predictions of single samples
     cluster_high: float = math.nan
+    deviation: float = math.nan  # of the repeats of a mean
+    samples: float = 0.0  # of a share, in each repeat; 0 where predictions are not kept
 
-    def interval(self) -> tuple[float, float]:
-        """Return the outermost bounds of both intervals, NaN where there is neither."""
+    def over_objects(self) -> Reproduced:
+        """Return it with the farther bounds of both intervals."""
         low, high = np.fmin(self.low, self.cluster_low), np.fmax(self.high, self.cluster_high)
-        return float(low), float(high)
+        return replace(self, low=float(low), high=float(high))
 
-    def times(self, factor: float) -> Reproduced:
-        """Return the value in a unit that is `factor` times smaller."""
-        scaled = ("value", "low", "high", "cluster_low", "cluster_high")
-        return replace(self, **{name: factor * getattr(self, name) for name in scaled})
+    def repeated(self, n: int, unit: Unit) -> Reproduced:
+        """Return it as after `n` repeats with the same mean and deviation."""
+        low, high = mean_bounds(self.value, self.deviation, n, unit, round(self.samples * n))
+        return replace(self, n=n, low=low, high=high)
+
+
+def mean_bounds(mean: float, deviation: float, n: int, unit: Unit, samples: int = 0) -> tuple[float, float]:
+    """Return the 95 % interval of a mean of n repeats: Student's, of a ratio on its logarithm.
+
+    Where Student's has no width or passes what is possible, a share of samples has the farther bounds of it and of
+    Wilson's. NaN for one repeat.
+    """
+    half_width = student_factor(n) * deviation / math.sqrt(n)
+    if unit.ratio and mean > 0:
+        factor = math.exp(half_width / mean)
+        low, high = mean / factor, mean * factor
+    else:
+        low, high = mean - half_width, mean + half_width
+        if samples and (half_width <= NO_WIDTH or low < unit.least or high > unit.most):
+            least, most = (unit.most * bound for bound in wilson_interval(mean / unit.most * samples, samples))
+            low, high = min(low, least), max(high, most)
+    return min(max(low, unit.least), unit.most), min(max(high, unit.least), unit.most)
 
 
 def read_results(paths: Iterable[str | Path]) -> dict[str, pd.DataFrame]:
@@ -71,37 +99,29 @@ def value_of_run(
     number: Number, results: Mapping[str, pd.DataFrame], clusters: Mapping[Counterpart, ShareDraws] | None = None
 ) -> Reproduced | None:
     """Return the run's value for a printed number, in its unit; None where the run has none."""
-    counterpart = number.counterpart
+    counterpart, unit, at_least = number.counterpart, UNITS[number.unit], False
     if counterpart is None or counterpart.file not in results:
         return None
+    draws = (clusters or {}).get(counterpart)
     if counterpart.file == RUNTIME:
         if (timed := runtime_mean(results[RUNTIME], counterpart)) is None:
             return None
         mean, error, n = timed
-        half_width = student_factor(n) * error
-        reproduced = Reproduced(mean, mean - half_width, mean + half_width, n)
+        deviation = error * math.sqrt(n)
     else:
         by_seed, at_least = values_by_seed(results[counterpart.file], counterpart)
         value_R, n = by_seed.to_numpy(), len(by_seed)
         if not n or np.isnan(value_R).any() or (n < 2 and counterpart.statistic == "deviation"):
             return None
-        if counterpart.statistic == "deviation":
-            deviation = float(value_R.std(ddof=1))
-            reproduced = Reproduced(deviation, *deviation_interval(deviation, n), n)
-        else:
-            mean, low, high = mean_interval(value_R)
-            low, high = (math.nan, math.nan) if at_least else (low, high)
-            reproduced = Reproduced(mean, low, high, n, at_least)
-    if draws := (clusters or {}).get(counterpart):
-        cluster_low, cluster_high = draws.bounds()
-        reproduced = replace(reproduced, cluster_low=cluster_low, cluster_high=cluster_high)
-    unit = UNITS[number.unit]
-    reproduced = reproduced.times(unit.factor)
-    low, high = (
-        bound if math.isnan(bound) else min(max(bound, unit.least), unit.most)
-        for bound in (reproduced.low, reproduced.high)
-    )
-    return replace(reproduced, low=low, high=high)
+        mean, deviation = float(value_R.mean()), float(value_R.std(ddof=1)) if n > 1 else math.nan
+    mean, deviation = unit.factor * mean, unit.factor * deviation
+    if counterpart.statistic == "deviation":
+        return Reproduced(deviation, *deviation_interval(deviation, n), n)
+    samples = int(draws.mask_N.sum()) if draws else 0
+    low, high = (math.nan, math.nan) if at_least else mean_bounds(mean, deviation, n, unit, samples)
+    cluster_low, cluster_high = draws.bounds() if draws else (math.nan, math.nan)
+    around = (unit.factor * cluster_low, unit.factor * cluster_high)
+    return Reproduced(mean, low, high, n, at_least, *around, deviation, samples / n)
 
 
 def values_by_seed(rows: pd.DataFrame, counterpart: Counterpart) -> tuple[pd.Series, bool]:

@@ -7,13 +7,14 @@ An ``@`` stands for the entry of the printed number's counterpart.
 
 import math
 import re
+from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from gpca.comparison.published import TIMES, Counterpart, Number, Reason, reason_of
+from gpca.comparison.published import TIMES, UNITS, Counterpart, Number, Reason, Unit, reason_of
 from gpca.comparison.values import RUNTIME, Reproduced, ShareDraws, deviation_interval, value_of_run
 from gpca.errors import InputError
 from gpca.evaluation.intervals import student_factor
@@ -23,18 +24,22 @@ from gpca.settings import NotNegative
 
 REPRODUCED, CLOSE, INCONCLUSIVE, NOT_REPRODUCED = "reproduced", "close", "inconclusive", "not reproduced"
 NOT_COMPARABLE, NOT_RUN = "not comparable", "not run"
+DECIDED = (REPRODUCED, CLOSE, NOT_REPRODUCED)
 JUDGED = (REPRODUCED, CLOSE, INCONCLUSIVE, NOT_REPRODUCED)
 VERDICTS = (*JUDGED, NOT_COMPARABLE, NOT_RUN)
 TOO_WIDE = "too wide an interval: it reaches farther than what is close, and does not exclude it"
+PAPER_TOO_WIDE = "the paper's own interval reaches farther than what is close, so no run can decide"
 ONE_REPEAT = "one repeat, so no interval"
 LOWER_BOUND = "some repeats ended before they were done, so the mean is a lower bound"
 COMPARISON_COLUMNS = (
     *("table", "row", "column", "statistic", "unit", "published", "upper", "decimals"),
     *("paper_low", "paper_high", "deviation", "reproduced", "ci_low", "ci_high", "cluster_low", "cluster_high"),
-    *("n", "at_least", "difference", "factor", "verdict", "repeat_of", "reason", "objects", "hardware"),
+    *("n", "n_needed", "at_least", "difference", "factor", "verdict", "over_objects"),
+    *("repeat_of", "reason", "objects", "hardware"),
 )
 CITED = ("file", "table", "source", "method", "metric", "concept", "unit")  # fields of a citation
 SAME = "@"
+MOST_REPEATS = 1_000_000
 _CITATION = re.compile(r"\{([^{}]+)\}")
 _SENTENCES = re.compile(r"(?<=\.) (?=[A-Z])")
 
@@ -105,7 +110,7 @@ def verdict_of(printed: Printed, reproduced: Reproduced, tolerance: Tolerance) -
     difference = _difference(printed, reproduced.value, tolerance)
     if reproduced.at_least:
         return NOT_REPRODUCED if difference > far else INCONCLUSIVE
-    value, (run_low, run_high) = scale(reproduced.value), (scale(bound) for bound in reproduced.interval())
+    value, run_low, run_high = (scale(x) for x in (reproduced.value, reproduced.low, reproduced.high))
     below = math.hypot(_minus(value, run_low), _minus(scale(printed.high), scale(printed.upper)))
     above = math.hypot(_minus(run_high, value), _minus(scale(printed.value), scale(printed.low)))
     low, high = difference - below, difference + above
@@ -114,6 +119,20 @@ def verdict_of(printed: Printed, reproduced: Reproduced, tolerance: Tolerance) -
     if abs(difference) <= near or low <= 0 <= high:
         return REPRODUCED
     return CLOSE if abs(difference) <= far else NOT_REPRODUCED
+
+
+def repeats_needed(printed: Printed, reproduced: Reproduced, tolerance: Tolerance, unit: Unit) -> int | None:
+    """Return the fewest repeats of the same mean and spread that are not inconclusive; None if no number is.
+
+    The more repeats, the narrower the interval, so the number is found by bisection.
+    """
+
+    def decides(n: int) -> bool:
+        return verdict_of(printed, reproduced.repeated(n, unit), tolerance) != INCONCLUSIVE
+
+    if reproduced.at_least or math.isnan(reproduced.deviation) or not decides(MOST_REPEATS):
+        return None
+    return bisect_left(range(MOST_REPEATS), True, lo=2, key=decides)
 
 
 def _difference(printed: Printed | Number, value: float, tolerance: Tolerance) -> float:
@@ -159,7 +178,7 @@ def compare(
             deviation = deviations.get((number.same_as or number.key)[:2])
         printed = printed_of(number, deviation)
         reproduced = values[number.key] = value_of_run(number, results, clusters)
-        sources, reason = counterpart.sources if counterpart else (), ""
+        sources, reason, needed = counterpart.sources if counterpart else (), "", None
         if counterpart is None:
             verdict, reason = NOT_COMPARABLE, number.note
         elif any(objects[source]["stand_in"] for source in sources if source in objects):
@@ -167,8 +186,10 @@ def compare(
         elif reproduced is None:
             verdict, reason = NOT_RUN, f"{counterpart.file} holds no such value"
         elif (verdict := verdict_of(printed, reproduced, tolerance)) == INCONCLUSIVE:
-            no_interval = math.isnan(reproduced.interval()[0])
-            reason = LOWER_BOUND if reproduced.at_least else ONE_REPEAT if no_interval else TOO_WIDE
+            needed = repeats_needed(printed, reproduced, tolerance, UNITS[number.unit])
+            mean_alone = counterpart.statistic == "mean" and not needed
+            reason = LOWER_BOUND if reproduced.at_least else ONE_REPEAT if math.isnan(reproduced.low) else TOO_WIDE
+            reason = PAPER_TOO_WIDE if reason == TOO_WIDE and mean_alone else reason
         elif verdict != REPRODUCED:
             reason = reason_of(number, reasons)
         first = values.get(number.same_as)
@@ -180,8 +201,10 @@ def compare(
             "upper": number.upper if number.upper > number.value else np.nan,
             "deviation": deviation.value if deviation else np.nan,
             "n": pd.NA,
+            "n_needed": needed or pd.NA,
             "at_least": False,
             "verdict": verdict,
+            "over_objects": verdict,
             "repeat_of": " / ".join(number.same_as) if repeats else "",
             "reason": filled(reason, number, results),
             "objects": ", ".join(title_of(objects[source]) for source in sources if source in objects),
@@ -197,6 +220,8 @@ def compare(
             shown |= {"factor": reproduced.value / nearest} if tolerance.factor else {}
             record |= {name: round(value, 6) for name, value in shown.items()}
             record |= {"n": reproduced.n, "at_least": reproduced.at_least}
+            if verdict in JUDGED:
+                record["over_objects"] = verdict_of(printed, reproduced.over_objects(), tolerance)
         if counterpart and counterpart.file in results and number.unit in TIMES:
             record["hardware"] = hardware
             if counterpart.file == RUNTIME:
@@ -204,7 +229,7 @@ def compare(
                 machines = timed.loc[timed["device"] == counterpart.concept, "hardware"].unique()
                 record["hardware"] = ", ".join(machines)
         records.append(record)
-    return pd.DataFrame(records, columns=list(COMPARISON_COLUMNS)).astype({"n": "Int64"})
+    return pd.DataFrame(records, columns=list(COMPARISON_COLUMNS)).astype({"n": "Int64", "n_needed": "Int64"})
 
 
 def judged_once(comparison: Frame) -> Frame:

@@ -71,12 +71,13 @@ def _printed(row: Mapping[str, str]) -> dict[str, str]:
     upper, deviation = printed["upper"], printed["deviation"]
     apart = REPEAT if row["repeat_of"] else DEVIATION if row["statistic"] == "deviation" else ""
     repeat = f"repeat of {row['repeat_of']}" if row["repeat_of"] else ""
+    needed = f"n = {float(row['n_needed']):.0f} would decide" if row["n_needed"] else ""
     low, high = printed["ci_low"], printed["ci_high"]
     published = printed["published"] + (f" to {upper}" if upper else "") + (f" ± {deviation}" if deviation else "")
     return {
         **{name: row[name] for name in ("table", "row", "column", "unit", "n", "verdict")},
         "group": apart or row["verdict"],
-        "reason": "; ".join(filter(None, (repeat, row["reason"]))),
+        "reason": "; ".join(filter(None, (repeat, row["reason"], needed))),
         "tone": TONES.get(row["verdict"], ""),
         "objects": ", ".join(filter(None, (row["objects"], row["hardware"]))),
         "published": published,

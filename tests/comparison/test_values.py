@@ -10,12 +10,13 @@ import pytest
 from scipy.stats import chi2
 
 from gpca.attribution.predictions import PREDICTION_COLUMNS
+from gpca.comparison.published import UNITS
 from gpca.comparison.values import cluster_draws, folder_behind, folders_behind, measured_on, read_results, value_of_run
 from gpca.errors import InputError
 from gpca.evaluation.intervals import wilson_interval
 
 from .conftest import write
-from .made_up import ACCURACY, LABELS, TIME, compared, number, runtime, tidy
+from .made_up import ACCURACY, LABELS, TIME, TOLERANCES, compared, number, runtime, tidy
 
 CONCEPTS = ("noise", "pose", "overlap")
 TAKEN = replace(ACCURACY, metrics=("predicted_as_pose", "test_samples"), concept="overlap")
@@ -26,6 +27,11 @@ def test_means_come_in_the_printed_unit_ratios_and_sources_are_taken_seed_by_see
     assert (found.value, found.n) == (pytest.approx(92), 3)
     assert found.high - found.value == pytest.approx(4.30265 * 2 / np.sqrt(3), rel=1e-5)
     assert value_of_run(number(), {"metrics.csv": tidy([0.9, 0.99, 1.0])}).high == 100
+    # What is compared by a factor has the interval of its logarithm, which does not reach 0.
+    labels = value_of_run(number(14, unit="labels", counterpart=ACCURACY), {"metrics.csv": tidy([2, 4, 18])})
+    assert 0 < labels.low < 1
+    assert labels.high / labels.value == pytest.approx(labels.value / labels.low)
+    assert {unit: UNITS[unit].ratio for unit in UNITS} == {unit: TOLERANCES[unit].factor for unit in UNITS}
     counts = {"predicted_as_pose": [20, 30], "test_samples": [100, 60]}
     rows = [tidy(each, metric=metric, concept="overlap") for metric, each in counts.items()]
     results = {"metrics.csv": pd.concat([*rows, tidy([1, 1], metric="test_samples")])}
@@ -67,7 +73,8 @@ def test_times_of_components_add_up():
     results = {"runtime.csv": runtime(icp=3.0, features=1.0, scores=7.0)}
     found = value_of_run(printed, results)
     assert (found.value, found.n) == (pytest.approx(4.0), 100)
-    assert found.high - found.value == pytest.approx(1.98422 * np.sqrt(0.3**2 + 0.1**2) / 10, rel=1e-5)
+    error = 1.98422 * np.sqrt(0.3**2 + 0.1**2) / 10
+    assert found.high / found.value == pytest.approx(np.exp(error / 4), rel=1e-5)
     assert value_of_run(printed, {"runtime.csv": runtime(icp=3.0)}) is None
     [row] = compared([printed], results).itertuples()
     assert (row.verdict, row.hardware, row.objects) == ("reproduced", "A processor", "MODEL")
@@ -121,8 +128,10 @@ def test_objects_that_differ_make_the_interval_wide(tmp_path):
     assert 0.5 <= low < 0.6
     assert 0.9 < high <= 1.0
     found = value_of_run(number(), {"metrics.csv": tidy([0.75] * 5)}, cluster_draws([ACCURACY], apart))
-    assert (found.low, found.high) == (75, 75)  # though no seed differs
-    assert found.interval() == (pytest.approx(100 * low), pytest.approx(100 * high))
+    # Of the given objects it has Wilson's of 120 samples in each of five seeds, as no seed differs.
+    assert (found.low, found.high) == pytest.approx([100 * bound for bound in wilson_interval(450, 600)])
+    found = found.over_objects()
+    assert (found.low, found.high) == pytest.approx((100 * low, 100 * high))
 
 
 def test_confusions_are_shares_too_and_views_of_one_instance_are_one_object(tmp_path):

@@ -6,12 +6,13 @@ from gpca.page.comparison import page_comparison
 HEAD = (
     "table,row,column,unit,published,upper,deviation,decimals,reproduced,ci_low,ci_high,n,at_least,difference,factor,"
 )
-HEAD += "verdict,reason,objects,statistic,repeat_of,hardware,paper_low,paper_high,cluster_low,cluster_high\n"
+HEAD += "verdict,reason,objects,statistic,repeat_of,hardware,paper_low,paper_high,cluster_low,cluster_high,"
+HEAD += "n_needed,over_objects\n"
 LINES = (
-    "I,YCB,GP-CA,%,99.6,,,1,97.44,95.41,99.4,5,False,-2.16,,close,too few epochs,YCB,mean,,,,,,\n",
-    "I,YCB,SHAP,%,31.4,,,1,31.42,26.0,27.0,5,False,0.02,,reproduced,,YCB,mean,,,,,,\n",
-    "III,YCB,random,labels,350.0,550.0,,-1,812.4,,,5,True,262.4,1.477,not reproduced,easier pool,YCB,mean,,,,,,\n",
-    "VI,DGCNN,none,%,85.2,,2.43,1,,,,,False,,,not run,asked for alone,,mean,,,,,,\n",
+    "I,YCB,GP-CA,%,99.6,,,1,97.44,95.41,99.4,5,False,-2.16,,close,too few epochs,YCB,mean,,,,,,,12,\n",
+    "I,YCB,SHAP,%,31.4,,,1,31.42,26.0,27.0,5,False,0.02,,reproduced,,YCB,mean,,,,,,,,\n",
+    "III,YCB,random,labels,350.0,550.0,,-1,812.4,,,5,True,262.4,1.477,not reproduced,easier pool,YCB,mean,,,,,,,,\n",
+    "VI,DGCNN,none,%,85.2,,2.43,1,,,,,False,,,not run,asked for alone,,mean,,,,,,,,\n",
 )
 
 
@@ -29,7 +30,8 @@ def test_numbers_have_the_papers_digits_and_verdicts_a_tone(tmp_path):
     shown = page_comparison(written(tmp_path, HEAD + "".join(LINES)))
     close, same, bound, not_run = rows_of(shown)
     assert (close["published"], close["reproduced"], close["interval"]) == ("99.6", "97.4", "[95.4, 99.4]")
-    assert (close["difference"], close["tone"], close["reason"]) == ("-2.2", "near", "too few epochs")
+    assert (close["difference"], close["tone"]) == ("-2.2", "near")
+    assert close["reason"] == "too few epochs; n = 12 would decide"
     assert same["difference"] == "0.02"  # not "0.0", which would claim more
     assert (bound["published"], bound["reproduced"], bound["interval"]) == ("350 to 550", "> 812", "")
     assert (bound["difference"], bound["factor"]) == ("262", "× 1.5")
@@ -62,7 +64,7 @@ def test_repeats_and_standard_deviations_are_counted_apart(tmp_path):
     deviation = LINES[1].replace("mean,", "deviation,")
     shown = page_comparison(written(tmp_path, HEAD + repeat + deviation))
     assert shown["verdicts"] == [("standard deviation", "", 1), ("repeat", "", 1)]
-    assert rows_of(shown)[0]["reason"] == "repeat of I / YCB / SA; too few epochs"
+    assert rows_of(shown)[0]["reason"] == "repeat of I / YCB / SA; too few epochs; n = 12 would decide"
     assert (rows_of(shown)[0]["group"], rows_of(shown)[0]["verdict"]) == ("repeat", "close")
 
 
