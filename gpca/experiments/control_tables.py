@@ -189,9 +189,9 @@ def loophole(run: Run, intervals) -> Figure:
     drawing, [[panel]] = panels(1, 1, 2.7, style.COLUMN_WIDTH_IN)
     colors = dict(zip(shown, LOOKS.values(), strict=False)) | LOOKS
     for k, name in enumerate(shown):
-        own = rows_where(rows, method=name).set_index("table")
-        there = [table for table in STEPS if table in own.index]
-        values = 100 * own.loc[there, ["value", "low", "high"]].to_numpy(float)
+        by_table = rows_where(rows, method=name).set_index("table")
+        there = [table for table in STEPS if table in by_table.index]
+        values = 100 * by_table.loc[there, ["value", "low", "high"]].to_numpy(float)
         across = [list(STEPS).index(table) + SIDE * (k - (len(shown) - 1) / 2) for table in there]
         spread = [values[:, 0] - values[:, 1], values[:, 2] - values[:, 0]]
         look = {"color": colors[name], "marker": "o", "ms": 3.5, "lw": 1.2, "elinewidth": 0.8}

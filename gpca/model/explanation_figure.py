@@ -31,8 +31,8 @@ def draw_explanation(explanation: Explanation, png_path: str | Path, names: str 
         raise ValueError("an explanation that came as one of many has no clouds to draw")
     views = _views(explanation, scene)
     view = widest_views(scene.target)[0]
-    found = np.concatenate([cloud for _, cloud in views[1:]]) @ view.T
-    outer = np.concatenate([scene.target @ view.T, np.quantile(found, (OUTSIDE, 1 - OUTSIDE), axis=0)])[:, :2]
+    placed = np.concatenate([cloud for _, cloud in views[1:]]) @ view.T
+    outer = np.concatenate([scene.target @ view.T, np.quantile(placed, (OUTSIDE, 1 - OUTSIDE), axis=0)])[:, :2]
     margin = 0.02 * np.ptp(outer, axis=0).max()
     corners_2_2 = np.stack([outer.min(axis=0) - margin, outer.max(axis=0) + margin], axis=1)
     wide, high = np.ptp(corners_2_2, axis=1)

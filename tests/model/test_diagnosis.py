@@ -107,7 +107,17 @@ def test_a_pose_takes_the_users_source_to_the_users_target(drill):
     np.testing.assert_allclose(frame.coordinates(transform(outside.poses[0].T_target_source, source)), expected)
     plain = json.loads(json.dumps(outside.as_dict()))
     assert np.array(plain["poses"][0]["T_target_source"]).shape == (4, 4)
-    assert set(plain) == {"error", "effects", "noise", "outliers", "missing", "poses", "scale", "undetermined"}
+    assert set(plain) == {
+        "error",
+        "effects",
+        "noise",
+        "noise_floor",
+        "outliers",
+        "missing",
+        "poses",
+        "scale",
+        "undetermined",
+    }
 
 
 def test_an_axis_has_a_name_where_it_is_nearly_one_of_the_targets():
