@@ -15,7 +15,7 @@ from gpca.experiments.recovery import policy_titles
 from gpca.explainers.registry import explainer_entry
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD
 
-EXPERIMENT = Experiment(name="claims")
+EXPERIMENT = Experiment(name="claims", beside=("verdict_map",))
 
 
 def compared_sources(run: Run) -> dict[str, Mapping[str, Any]]:

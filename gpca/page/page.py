@@ -23,6 +23,7 @@ from gpca.reporting.registry import SUFFIXES, by_section
 
 TEMPLATES = Path(__file__).parent / "templates"
 KEY_FIGURES = ("causes_example", "fig2_overview")  # the first of these that the run has opens the page
+VERDICTS = "verdicts"  # the figure above the comparison
 DOCS = "../../docs"  # from the folder of a run in a checkout, results/{run}
 FEWEST = 2  # mean number of rows with the same first label from which they form a group
 _CSS_PIXELS = 170 / 300  # CSS pixels of a figure's pixel at 300 dpi, so that its letters are as large as the text's
@@ -91,6 +92,7 @@ def write_page(folder: str | Path, run: FinishedRun) -> None:
         run=run,
         findings=findings_of(folder, run.titles, shown),
         key_figure=key_figure and _content(folder, key_figure, run, links),
+        verdict_map=_content(folder, shown[VERDICTS], run, links) if VERDICTS in shown else None,
         sections=sections,
         comparison=page_comparison(folder / "comparison.csv", run.reference),
         links=links,

@@ -1,0 +1,167 @@
+"""A map of the verdicts on the printed numbers: a cell for each mean, as the paper's tables place it."""
+
+import math
+from pathlib import Path
+from typing import NamedTuple
+
+from gpca.comparison.published import TABLES, TEXT
+from gpca.comparison.verdicts import (
+    CLOSE,
+    COMPARISON_COLUMNS,
+    DECIDED,
+    INCONCLUSIVE,
+    NOT_REPRODUCED,
+    PAPER_TOO_WIDE,
+    REPRODUCED,
+    judged_once,
+)
+from gpca.declarations.plan import Run
+from gpca.declarations.result import Figure, Frame, figure
+from gpca.io.csv_file import read_numbers
+from gpca.reporting.figures.style import (
+    GRAY,
+    GREEN,
+    LIGHT_GRAY,
+    SMALL_PT,
+    TEXT_WIDTH_IN,
+    VERMILION,
+    use_style,
+    write_title,
+)
+
+NUMBERS = ("difference", "factor")
+BY_PAPER = "inconclusive by the paper's own interval"
+LOOKS = {  # verdict -> color of a cell, and of the number in it
+    REPRODUCED: (GREEN, "white"),
+    CLOSE: ("#9AD3BF", "black"),
+    NOT_REPRODUCED: (VERMILION, "white"),
+    INCONCLUSIVE: ("white", "black"),
+    BY_PAPER: ("#E8E8E8", "black"),
+}
+OTHER_LOOK = (LIGHT_GRAY, GRAY)
+LINES = (("I", "II", "III", "V"), ("IV", "VI", "VII"), (TEXT,))  # tables that stand side by side
+SHORT = {"Coffee Cup": "CC", "LINEMOD": "LM", "Linear SVM": "SVM", "No Reduction": "none"}
+CELL_IN, ROW_IN, GAP_IN, HEAD_IN = 0.34, 0.16, 0.14, 0.34
+LETTER_IN = 0.052  # of a label, on average
+TOP_IN = 0.52  # for title and legend
+MOST_ROWS = 7  # of the running text in one column
+
+
+class Block(NamedTuple):
+    """Cells of a table: labels of rows and columns, and (row, column) -> the row of the comparison."""
+
+    title: str
+    rows: list[str]
+    columns: list[str]
+    cells: dict[tuple[str, str], dict]
+
+    @property
+    def width_in(self) -> float:
+        """Width with the labels of its rows."""
+        return self.labels_in + CELL_IN * len(self.columns)
+
+    @property
+    def labels_in(self) -> float:
+        """Width of the labels of its rows."""
+        return 0.08 + LETTER_IN * max(len(SHORT.get(name, name)) for name in self.rows)
+
+
+def read_comparison(path: str | Path) -> Frame:
+    """Read the rows of ``comparison.csv``."""
+    return read_numbers(path, COMPARISON_COLUMNS, NUMBERS, optional=NUMBERS)
+
+
+@figure(
+    "What the paper says in sentences",
+    "Verdicts on the printed numbers",
+    """A cell for each printed mean: green if the run reproduces it (pale: close), red if it does not, white if our
+    interval is too wide to say, gray if the paper's own is. The number is how far our value lies above the printed one,
+    in the unit of the table, or by what factor it is larger (×) or smaller (÷); > marks a lower bound.""",
+    comparison=(read_comparison, "comparison.csv"),
+)
+def verdicts(run: Run, comparison) -> Figure:
+    by_paper = comparison["reason"] == PAPER_TOO_WIDE
+    once = judged_once(comparison.assign(verdict=comparison["verdict"].mask(by_paper, BY_PAPER)))
+    lines = [[block for table in tables for block in _blocks(table, once)] for tables in LINES]
+    heights_in = [HEAD_IN + ROW_IN * max(len(block.rows) for block in line) + GAP_IN for line in lines if line]
+    size = (TEXT_WIDTH_IN, TOP_IN + sum(heights_in))
+    drawing = use_style().figure(figsize=size)
+    panel = drawing.add_axes((0, 0, 1, 1), xlim=(0, size[0]), ylim=(size[1], 0))
+    panel.axis("off")
+    top_in = TOP_IN
+    for line, height_in in zip(filter(None, lines), heights_in, strict=True):
+        gap_in = (size[0] - sum(block.width_in for block in line)) / len(line)
+        left_in = 0.0
+        for block in line:
+            _draw(panel, block, left_in, top_in)
+            left_in += block.width_in + gap_in
+        top_in += height_in
+    counted = once["verdict"].value_counts()
+    left_in = 0.05
+    for verdict in dict.fromkeys([*LOOKS, *counted.index]):
+        words = f"{counted.get(verdict, 0)} {verdict}"
+        _cell(panel, left_in, 0.26, *LOOKS.get(verdict, OTHER_LOOK), width_in=0.14)
+        panel.text(left_in + 0.18, 0.26 + ROW_IN / 2, words, fontsize=SMALL_PT, va="center")
+        left_in += 0.36 + LETTER_IN * len(words)
+    decided = once["verdict"].isin(DECIDED).sum()
+    write_title(drawing, f"{decided} of {len(once)} printed means are decided{run.stand_ins()}")
+    return drawing
+
+
+def _blocks(table: str, once: Frame) -> list[Block]:
+    """Return the blocks of a table: one, but for the running text, whose numbers have a row each."""
+    rows = once[once["table"] == table].to_dict("records")
+    if table == TEXT:
+        named = {f"{row['row']}: {row['column']}": row for row in rows}
+        parts = [[*named][start : start + MOST_ROWS] for start in range(0, len(named), MOST_ROWS)]
+        titles = [TABLES[TEXT].title] + [""] * len(parts)
+        return [
+            Block(title, part, [""], {(name, ""): named[name] for name in part})
+            for title, part in zip(titles, parts, strict=False)
+        ]
+    split = {row["row"]: row["row"].split(", ") for row in rows}
+    crossed = table == "VI"  # backbones by reductions
+    cells = {(split[r["row"]][0], split[r["row"]][1]) if crossed else (r["row"], r["column"]): r for r in rows}
+    row_labels, column_labels = (list(dict.fromkeys(key[i] for key in cells)) for i in (0, 1))
+    return [Block(f"Table {table}", row_labels, column_labels, cells)] if rows else []
+
+
+def _draw(panel, block: Block, left_in: float, top_in: float) -> None:
+    first_in, below_in = left_in + block.labels_in, top_in + HEAD_IN
+    title_in = (first_in, top_in + 0.08) if block.columns != [""] else (left_in + 0.05, top_in + 0.22)
+    panel.text(*title_in, block.title, weight="bold", va="center")
+    for j, name in enumerate(block.columns):
+        words = SHORT.get(name, name).replace("#Labels ", "")
+        place = (first_in + CELL_IN * (j + 0.5), below_in - 0.07)
+        panel.text(*place, words, fontsize=SMALL_PT, ha="center", va="center")
+    for i, name in enumerate(block.rows):
+        middle_in = below_in + ROW_IN * (i + 0.5)
+        panel.text(first_in - 0.04, middle_in, SHORT.get(name, name), fontsize=SMALL_PT, ha="right", va="center")
+        for j, column in enumerate(block.columns):
+            if (row := block.cells.get((name, column))) is None:
+                continue
+            color, ink = LOOKS.get(row["verdict"], OTHER_LOOK)
+            x_in = first_in + CELL_IN * j
+            _cell(panel, x_in, below_in + ROW_IN * i, color, ink)
+            panel.text(
+                x_in + CELL_IN / 2, middle_in, _words(row), color=ink, fontsize=SMALL_PT, ha="center", va="center"
+            )
+
+
+def _cell(panel, x_in: float, y_in: float, color: str, ink: str, width_in: float = CELL_IN) -> None:
+    from matplotlib.patches import Rectangle
+
+    edge = GRAY if color == "white" else "white"
+    panel.add_patch(
+        Rectangle((x_in + 0.01, y_in + 0.01), width_in - 0.02, ROW_IN - 0.02, facecolor=color, edgecolor=edge)
+    )
+
+
+def _words(row: dict) -> str:
+    """Return the difference, or the factor, in a few letters; a lower bound has a sign before it."""
+    bound, factor, difference = ">" if row["at_least"] == "True" else "", row["factor"], row["difference"]
+    if factor == factor:
+        by = max(factor, 1 / factor) if factor else math.inf
+        return f"{bound}{'×' if factor >= 1 else '÷'}{by:.{0 if by > 9.9 else 1}f}"
+    digits = 1 if abs(difference) >= 0.95 or row["unit"] == "%" else 2
+    return "" if difference != difference else f"{bound}{difference:+.{digits}f}"
