@@ -12,11 +12,13 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
+from gpca.alignment.features import estimate_normals
 from gpca.alignment.icp import CONVERGED, ICP, ICPSettings, require_cloud
 from gpca.alignment.icp_kernels import LISTED, align_all, plane_all, pull_all
 from gpca.rigid import rigid_motion, transform
 
 MOST_LISTS = 1 << 16  # beyond that, queries in new voxels search the cells
+NO_NORMALS = np.empty((0, 3))
 SINGULAR = 1e-10  # eigenvalue, relative to the largest, below which a step leaves its direction alone
 
 
@@ -129,7 +131,10 @@ def pulls(
 
 
 class BatchedPlaneICP:
-    """ICP to the planes of one target (P, 3) with normals; the correspondence distance is in the unit of the points."""
+    """ICP to the planes of one target (P, 3) with normals; the correspondence distance is in the unit of the points.
+
+    Generalized ICP takes planes of the source as well, by its normals (N, 3).
+    """
 
     def __init__(self, target: np.ndarray, target_normals: np.ndarray, settings: ICPSettings) -> None:
         require_cloud("target cloud", target)
@@ -139,19 +144,52 @@ class BatchedPlaneICP:
         self._normals = np.ascontiguousarray(target_normals[rows_P], np.float64)
         self.iterations = settings.max_iterations
 
-    def register(self, source: np.ndarray, T_target_source_init_n: np.ndarray) -> tuple[np.ndarray, ...]:
+    def register(
+        self,
+        source: np.ndarray,
+        T_target_source_init_n: np.ndarray,
+        max_iterations: int | None = None,
+        source_normals: np.ndarray | None = None,
+    ) -> tuple[np.ndarray, ...]:
         """Align `source` (N, 3) from n initial poses (n, 4, 4), as :meth:`BatchedICP.register`."""
         require_cloud("source cloud", source)
-        source = np.ascontiguousarray(source, np.float64)
+        source, normals = (
+            np.ascontiguousarray(rows, np.float64)
+            for rows in (source, NO_NORMALS if source_normals is None else source_normals)
+        )
         poses_n = np.array(T_target_source_init_n, np.float64)
-        return _descend(lambda rows_m: self.sums(source, poses_n[rows_m]), poses_n, self.iterations)
+        iterations = self.iterations if max_iterations is None else max_iterations
+        return _descend(lambda rows_m: self.sums(source, poses_n[rows_m], normals), poses_n, iterations)
 
-    def sums(self, source: np.ndarray, poses_n: np.ndarray) -> tuple[np.ndarray, ...]:
+    def sums(
+        self, source: np.ndarray, poses_n: np.ndarray, source_normals: np.ndarray = NO_NORMALS
+    ) -> tuple[np.ndarray, ...]:
         """Return Σ JᵀJ (n, 6, 6) and Σ Jᵀd (n, 6) of the plane distances d, fitness (n,) and inlier RMSE (n,)."""
         n = len(poses_n)
         sums = np.empty((n, 6, 6)), np.empty((n, 6)), np.empty(n), np.empty(n)
-        plane_all(source, self._target, self._normals, np.ascontiguousarray(poses_n), *sums)
+        plane_all(source, source_normals, self._target, self._normals, np.ascontiguousarray(poses_n), *sums)
         return sums
+
+
+class SelfMadeNormals:
+    """Point-to-plane or generalized ICP to one target (P, 3) by normals of the clouds' own points."""
+
+    def __init__(self, target: np.ndarray, settings: ICPSettings) -> None:
+        require_cloud("target cloud", target)
+        self._icp = BatchedPlaneICP(target, estimate_normals(target), settings)
+        self._generalized = settings.method == "generalized"
+
+    def register(
+        self, source: np.ndarray, T_target_source_init_n: np.ndarray, max_iterations: int | None = None
+    ) -> tuple[np.ndarray, ...]:
+        """Align `source` (N, 3) from n initial poses (n, 4, 4), as :meth:`BatchedICP.register`."""
+        normals = estimate_normals(source) if self._generalized else None
+        return self._icp.register(source, T_target_source_init_n, max_iterations, normals)
+
+
+def icp_to(target: np.ndarray, settings: ICPSettings) -> BatchedICP | SelfMadeNormals:
+    """Return the ICP to a target (P, 3) without normals; methods that need some estimate them."""
+    return (BatchedICP if settings.method == "point_to_point" else SelfMadeNormals)(target, settings)
 
 
 def register_each_to_planes(

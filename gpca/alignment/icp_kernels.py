@@ -13,6 +13,7 @@ import numpy as np
 from gpca.process.compilation import INNER_LOOP, njit
 
 LISTED = 16  # target points per voxel
+FLAT = 1e-3  # variance along the normal of a plane of generalized ICP, of that within it; Open3D's default
 TARGET = "( d2 l1 d1 d l1 d l1 i1 i2 d3 d1 l1 d )"  # types of the fields of a target, see `njit`
 
 
@@ -202,24 +203,27 @@ def pull_all(source, target, poses, pulls, fitness, rmse):
             pulls[n, 3 + i] = moments[3, i] - moments[i, 3]
 
 
-@njit(ahead=f"d2 {TARGET} d2 d3 d3 d2 d1 d1", cache=True)
-def plane_all(source, target, normals, poses, hessians, gradients, fitness, rmse):
-    """At every pose fill Σ JᵀJ (n, 6, 6), Σ Jᵀd (n, 6) over correspondences, d = n·(y - q), J = [y × n, n].
+@njit(ahead=f"d2 d2 {TARGET} d2 d3 d3 d2 d1 d1", cache=True)
+def plane_all(source, source_normals, target, normals, poses, hessians, gradients, fitness, rmse):
+    """At every pose fill Σ JᵀWJ (n, 6, 6), Σ JᵀWr (n, 6) over correspondences, r = y - q, J = [-[y], I].
 
-    `normals` (P, 3) are in the order of the target's points.
+    W = n nᵀ keeps distances from planes; where the source has normals m as well, W = (C(n) + C(m))⁻¹ with
+    C(n) = I - (1 - `FLAT`) n nᵀ, as in generalized ICP. `normals` (P, 3) are in the order of the target's points.
     """
     room, row = np.empty(LISTED), np.empty(6)
     for n in range(len(poses)):
         hessian, gradient = hessians[n], gradients[n]
         hessian[:], gradient[:] = 0.0, 0.0
-        fitness[n], rmse[n] = _plane_sums(source, target, normals, poses[n], hessian, gradient, room, row)
+        fitness[n], rmse[n] = _plane_sums(
+            source, source_normals, target, normals, poses[n], hessian, gradient, room, row
+        )
 
 
 @njit(**INNER_LOOP)
-def _plane_sums(source, target, normals, pose, hessian, gradient, room, row):
+def _plane_sums(source, source_normals, target, normals, pose, hessian, gradient, room, row):
     points, starts, low, cell, cells, voxel, voxels, list_rows, listed, offsets, reach, used, distance = target
     lists = (voxel, voxels, list_rows, listed, offsets, reach, used, distance)
-    count, squares = 0, 0.0
+    count, squares, generalized = 0, 0.0, len(source_normals) > 0
     for i in range(len(source)):
         x, y, z = source[i, 0], source[i, 1], source[i, 2]
         px = pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z + pose[0, 3]
@@ -230,18 +234,40 @@ def _plane_sums(source, target, normals, pose, hessian, gradient, room, row):
             continue
         rx, ry, rz = px - points[index, 0], py - points[index, 1], pz - points[index, 2]
         square = rx * rx + ry * ry + rz * rz
-        if square < distance * distance:
-            nx, ny, nz = normals[index, 0], normals[index, 1], normals[index, 2]
-            row[0], row[1], row[2] = py * nz - pz * ny, pz * nx - px * nz, px * ny - py * nx
-            row[3], row[4], row[5] = nx, ny, nz
-            off_plane = rx * nx + ry * ny + rz * nz
-            count += 1
-            squares += square
-            for a in range(6):
-                gradient[a] += row[a] * off_plane
-                for b in range(6):
-                    hessian[a, b] += row[a] * row[b]
+        if square >= distance * distance:
+            continue
+        count += 1
+        squares += square
+        nx, ny, nz = normals[index, 0], normals[index, 1], normals[index, 2]
+        if not generalized:
+            _add(hessian, gradient, row, px, py, pz, rx, ry, rz, nx, ny, nz, 1.0)
+            continue
+        a, b, c = source_normals[i, 0], source_normals[i, 1], source_normals[i, 2]
+        mx = pose[0, 0] * a + pose[0, 1] * b + pose[0, 2] * c
+        my = pose[1, 0] * a + pose[1, 1] * b + pose[1, 2] * c
+        mz = pose[2, 0] * a + pose[2, 1] * b + pose[2, 2] * c
+        for axis in range(3):
+            _add(hessian, gradient, row, px, py, pz, rx, ry, rz, axis == 0, axis == 1, axis == 2, 0.5)
+        # The sum and the difference of both normals are eigenvectors.
+        for sign in (1.0, -1.0):
+            ux, uy, uz = nx + sign * mx, ny + sign * my, nz + sign * mz
+            length = ux * ux + uy * uy + uz * uz
+            if length > 1e-12:
+                weight = 1.0 / (2.0 - (1.0 - FLAT) * 0.5 * length) - 0.5
+                _add(hessian, gradient, row, px, py, pz, rx, ry, rz, ux, uy, uz, weight / length)
     return count / len(source), np.sqrt(squares / max(count, 1))
+
+
+@njit(forceinline=True, **INNER_LOOP)
+def _add(hessian, gradient, row, px, py, pz, rx, ry, rz, nx, ny, nz, weight):
+    """Add the square of the residual along n, times a weight."""
+    row[0], row[1], row[2] = py * nz - pz * ny, pz * nx - px * nz, px * ny - py * nx
+    row[3], row[4], row[5] = nx, ny, nz
+    off_plane = weight * (rx * nx + ry * ny + rz * nz)
+    for a in range(6):
+        gradient[a] += row[a] * off_plane
+        for b in range(6):
+            hessian[a, b] += weight * row[a] * row[b]
 
 
 @njit(**INNER_LOOP)

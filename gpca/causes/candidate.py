@@ -13,9 +13,10 @@ from typing import Protocol
 
 import numpy as np
 
-from gpca.alignment.batched_icp import BatchedICP
+from gpca.alignment.batched_icp import icp_to
 from gpca.alignment.icp import ICPSettings
 from gpca.causes.dataset import Causes
+from gpca.causes.forms import DrawnForm, what_remains
 from gpca.causes.settings import FEWEST_POINTS, OBSERVED, CauseSettings
 from gpca.causes.truth import NONE, SUBSETS, capped
 from gpca.errors import InputError
@@ -31,7 +32,7 @@ CAUSE_OF = {"noise": NOISE, "outliers": NOISE, "rotation_rad": POSE, "translatio
 
 
 class MovingICP(Protocol):
-    """ICP to one target from many poses, such as :class:`BatchedICP`."""
+    """ICP to one target from many poses, such as :func:`icp_to`."""
 
     def register(self, source: np.ndarray, T_n: np.ndarray, /) -> tuple[np.ndarray, ...]:
         """Align points (N, 3) from poses (n, 4, 4): poses, fitness (n,), inlier RMSE (n,)."""
@@ -58,6 +59,8 @@ class Candidate:
     model_at_truth: np.ndarray | None = None  # (P, 3) where there is no pose error, if that changes the model's points
     whole_model: np.ndarray | None = None  # (P, 3) without missing surface, if that changes the model's points
     toward_hidden: np.ndarray | None = None  # (3,) unit vector along which a half-space has cut the surface off
+    form: DrawnForm | None = None  # of what was drawn
+    beside: int = 0  # observed points that lie on another thing, the last ones
 
     @property
     def present(self) -> tuple[int, ...]:
@@ -82,7 +85,7 @@ class Candidate:
 
     def icp(self, target: np.ndarray, causes: tuple[int, ...], settings: ICPSettings) -> MovingICP:
         """Return the ICP to a target, which has these of the applied causes."""
-        return BatchedICP(target, settings)
+        return icp_to(target, settings)
 
     def start(self, causes: tuple[int, ...]) -> np.ndarray:
         """Return where a registration with these of the applied causes starts."""
@@ -100,6 +103,7 @@ def draw_candidate(
     without that some is hidden in what was observed.
     """
     fewest, most = settings.points
+    form = DrawnForm.drawn(settings.form, random.spawn(1)[0])
     counts = np.exp(random.uniform(np.log(fewest), np.log(most), size=2)).round().astype(int)
     strong, small = (
         {part.name: random.uniform(*getattr(ranges, part.name)) for part in fields(ranges)}
@@ -111,14 +115,16 @@ def draw_candidate(
     n_model, n_seen = np.minimum(counts, len(surface) // 2)
     n_observed = min(round(n_seen / (1 - severity["crop"])), len(surface) - n_model)
     order = random.permutation(len(surface))
-    model, points = surface[order[:n_model]], surface[order[n_model : n_model + n_observed]]
+    model, points = form.model_and_observed(surface, order, n_model, n_observed)
     jitter = random.normal(size=points.shape)
     anywhere = random.uniform(-0.5, 0.5, size=points.shape)
     is_outlier = random.random(len(points)) < strong["outliers"]
     toward_hidden = random_direction(random)
-    along = points @ toward_hidden
     axis, direction = random_direction(random), random_direction(random)
-    seen, kept = (within_half_space(along, level["crop"], FEWEST_POINTS) for level in (small, strong))
+    seen = within_half_space(points @ toward_hidden, small["crop"], FEWEST_POINTS)
+    kept = form.left(points, toward_hidden, strong["crop"])
+    if applied[OVERLAP] and settings.form.occlusion == "visibility":
+        severity["crop"] = 1 - len(kept) / len(points)
     T_near, T_init = (
         displacement(level["rotation_rad"] * axis, level["translation"] * direction) for level in (small, strong)
     )
@@ -129,50 +135,35 @@ def draw_candidate(
         whole_model, model = model, left[:n_model]
         if random.random() < 0.5:
             kept, severity["crop"] = seen, small["crop"]
+    noisy = np.where(is_outlier[:, None], form.outliers(anywhere), form.noisy(points, strong["noise"], jitter))
+    table = form.table(surface, form.beside(n_seen))
+    on_table, rows = form.random.normal(size=table.shape), len(points) + np.arange(len(table))
     return Candidate(
         applied=applied,
         model=model,
         whole_model=whole_model,
-        clean=points + small["noise"] * jitter,
-        noisy=np.where(is_outlier[:, None], anywhere, points + strong["noise"] * jitter),
-        seen=seen,
-        kept=kept,
+        clean=np.concatenate([points + small["noise"] * jitter, table + small["noise"] * on_table]),
+        noisy=np.concatenate([noisy, table + strong["noise"] * on_table]),
+        seen=np.concatenate([seen, rows]),
+        kept=np.concatenate([kept, rows]),
         T_near=T_near,
         T_init=T_init,
         severity=severity,
         toward_hidden=toward_hidden,
+        form=form,
+        beside=len(table),
     )
-
-
-VIEWED_FROM = 3.0  # diameters; the distance of a sensor that sees one side
-FLIPPED = 100.0  # times the largest distance from it: the radius of the sphere that points are flipped at
-
-
-def what_remains(points: np.ndarray, lacking: float, random: np.random.Generator) -> np.ndarray:
-    """Return rows, in random order, of points (N, 3) in random order that a partial model has.
-
-    As often as not it lacks such a share of them, beyond a plane, or all that are hidden from one side (the hull of the
-    flipped points: Katz et al. 2007).
-    """
-    from scipy.spatial import ConvexHull
-
-    toward, of_one_side = random_direction(random), random.random() < 0.5
-    if not of_one_side:
-        return random.permutation(within_half_space(points @ toward, lacking, FEWEST_POINTS))
-    rays = points - VIEWED_FROM * toward
-    lengths = np.linalg.norm(rays, axis=1, keepdims=True)
-    flipped = rays + 2 * (FLIPPED * lengths.max() - lengths) * rays / lengths
-    hull = ConvexHull(np.concatenate([flipped, np.zeros((1, 3))])).vertices
-    return random.permutation(np.sort(hull[hull < len(points)]))
 
 
 def redrawn(candidate: Candidate, surface: np.ndarray, random: np.random.Generator) -> Candidate:
     """Return a candidate without causes once more: as many other points, with the same severities and start."""
-    rows = random.permutation(len(surface))[: len(candidate.model) + len(candidate.clean)]
-    model, points = np.split(surface[rows], [len(candidate.model)])
-    clean = points + candidate.severity["noise"] * random.normal(size=points.shape)
+    form, count = candidate.form, len(candidate.clean) - candidate.beside
+    assert form is not None
+    model, points = form.model_and_observed(surface, random.permutation(len(surface)), len(candidate.model), count)
+    whole = np.concatenate([points, form.table(surface, candidate.beside)])
+    clean = whole + candidate.severity["noise"] * random.normal(size=whole.shape)
     seen = within_half_space(points @ candidate.toward_hidden, candidate.severity["crop"], FEWEST_POINTS)
-    return replace(candidate, model=model, clean=clean, seen=seen)
+    return replace(candidate, model=model, clean=clean, seen=np.concatenate([seen, np.arange(count, len(whole))]))
 
 
 class Unmeasurable(Exception):

@@ -12,7 +12,7 @@ from time import perf_counter
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gpca.alignment.batched_icp import BatchedICP
+from gpca.alignment.batched_icp import icp_to
 from gpca.alignment.icp import ICPSettings, clipped_cost
 from gpca.alignment.pose_error import displacements
 from gpca.causes.dataset import Causes
@@ -48,10 +48,10 @@ def describe_remedied(pair: ObservedPair, settings: DescriptorSettings, icp: ICP
         cloud = (observed if NOISE in alone else cleaned)[: settings.icp_points]
         starts_k = near_k if POSE in alone else far_k
         if OVERLAP in alone:  # the model is aligned to the observed cloud, as the registration did
-            T_k, fitness_k, rmse_k = BatchedICP(cloud, icp).register(model, inverses(starts_k))
+            T_k, fitness_k, rmse_k = icp_to(cloud, icp).register(model, inverses(starts_k))
             T_k = inverses(T_k)
         else:
-            T_k, fitness_k, rmse_k = BatchedICP(model, icp).register(cloud, starts_k)
+            T_k, fitness_k, rmse_k = icp_to(model, icp).register(cloud, starts_k)
         cost_k = clipped_cost(fitness_k, rmse_k, icp.correspondence_distance)
         best = cost_k.argmin()
         counted.append(T_k if POSE in alone else T_k[[best]])

@@ -166,11 +166,28 @@ def draw_further(
 
     The chunk names the draws: two have no candidate in common, and neither depends on the other.
     """
-    shares = asdict(settings.shares) | {BORDERLINE: 0.0, GEOMETRY: 0.0}
-    labeled = Shares(**{name: share / sum(shares.values()) for name, share in shares.items()})
-    further = replace(settings, train=wanted, shares=labeled)
+    further = replace(_labeled_alone(settings), train=wanted)
     drawing = _Drawing(objects, source, seed, settings, further, ("further", chunk))
     return as_causes(drawing.of_split("train"), (source, seed))[0]
+
+
+def draw_shifted(
+    objects: ObjectClouds, source: str, seed: int, settings: CauseSettings
+) -> tuple[Causes, Tally, np.ndarray]:
+    """Draw the test samples of :func:`draw_causes` but borderline ones; groups that cannot be filled stay smaller."""
+    drawing = _Drawing(objects, source, seed, settings, labeled := _labeled_alone(settings))
+    records = drawing.up_to(settings.candidates * settings.test, "test", Quotas(settings.test, labeled))
+    if not records:
+        fault = f"none of {settings.candidates * settings.test} candidates is nominal or has failed from a cause"
+        raise InputError(f"causes of {source}, seed {seed}", fault, "raise causes.candidates")
+    causes, icp_seconds_S = as_causes(records, (source, seed))
+    return causes, drawing.tally, icp_seconds_S
+
+
+def _labeled_alone(settings: CauseSettings) -> CauseSettings:
+    """Return the settings with the same shares of all samples but borderline ones."""
+    shares = asdict(settings.shares) | {BORDERLINE: 0.0, GEOMETRY: 0.0}
+    return replace(settings, shares=Shares(**{name: share / sum(shares.values()) for name, share in shares.items()}))
 
 
 class _Drawing:

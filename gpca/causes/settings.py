@@ -78,6 +78,18 @@ class Small:
 
 
 @dataclass(frozen=True)
+class Form:
+    """How the truth is generated, beside the severities; explainers learn the first of each (docs/shifts.md)."""
+
+    occlusion: Literal["half_space", "patches", "visibility"] = "half_space"
+    noise: Literal["white", "warped", "quantized"] = "white"
+    outliers: Literal["anywhere", "clustered"] = "anywhere"
+    scale: Share = 0.0  # of the model's size, by which it is too large or too small
+    lacking: Hidden = 0.0  # share of its surface that the model lacks beyond a plane, whatever the causes
+    clutter: Hidden = 0.0  # share of the observed points that lie on a table
+
+
+@dataclass(frozen=True)
 class Limits:
     """The limits that tell the states apart, of errors relative to the diameter."""
 
@@ -121,6 +133,7 @@ class CauseSettings(UncertaintySettings):
     present: OpenShare = 0.5  # probability of each cause
     partial: Share = 0.0  # of those without overlap, have a model that lacks surface
     lacking: tuple[Hidden, Hidden] = (0.10, 0.50)  # share beyond a plane that it lacks; half lack what one side hides
+    form: Form = field(default_factory=Form)
     moved: Moved = MODEL  # onto the other cloud: the model lacks partners where surface is missing, the observed none
     severities: CauseSeverities = field(default_factory=CauseSeverities)
     small: Small = field(default_factory=Small)  # what there is of a cause that is not applied

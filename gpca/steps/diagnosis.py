@@ -138,6 +138,7 @@ class World:
         starts: runs of each from other starts.
         read: gives the registrations with descriptors or re-enactments attached, by an explainer's `reads`.
         fold_S: (S,) folds by which explainers learn from this world: from all but the one that they are asked about.
+        apart: no family of objects is learned from that explainers are asked about, in whatever source.
     """
 
     def __init__(
@@ -148,9 +149,11 @@ class World:
         starts: int,
         read: Callable[[str], Registrations],
         fold_S: np.ndarray | None = None,
+        apart: bool = False,
     ) -> None:
         self._axes, self._files, self._registrations = (job.source, job.seed), files, registrations
         self._read, self._fold_S = read, fold_S
+        self._left_out = np.unique(registrations.cluster) if apart else ()
         self._encoder = EncoderSettings(**job.section("encoder"))
         descriptors = DescriptorSettings(**job.section("descriptors"))
         calls = ReenactmentSettings(**job.section("reenactment")).calls(starts)
@@ -173,7 +176,8 @@ class World:
         files = list(zip(self._files["causes"], self._files[reads], strict=True)) if learned_from == OBJECTS else []
         for path, read in files:
             registrations = with_what_it_reads(labeled(Causes.load(path)), reads, read)
-            learned.append(registrations.subset(training_rows(registrations, path)))
+            rows = training_rows(registrations, path)
+            learned.append(registrations.subset(rows[~np.isin(registrations.cluster[rows], self._left_out)]))
         if reads == EMBEDDINGS:
             axes = [part.axes for part in learned] or [None] * len(self._files["encoders"])
             for weights, trained_on in zip(self._files["encoders"], axes, strict=True):

@@ -3,7 +3,8 @@ import pytest
 from scipy.spatial import cKDTree
 
 from gpca.alignment import batched_icp
-from gpca.alignment.batched_icp import BatchedICP, BatchedPlaneICP
+from gpca.alignment.batched_icp import BatchedICP, BatchedPlaneICP, icp_to
+from gpca.alignment.features import estimate_normals
 from gpca.alignment.icp import ICP, METHODS, ICPSettings
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Severities
@@ -217,3 +218,13 @@ def test_without_correspondences_a_run_to_planes_stays_where_it_began():
     assert (poses_2[0] == far[0]).all()
     assert fitness_2.tolist() == [0, 1]
     assert (rmse_2 < 1e-6).all()
+
+
+def test_generalized_runs_end_where_open3d_ends(objects):
+    source, target, _ = clouds(objects, 0)
+    settings = ICPSettings("generalized")
+    starts_n = starts(6)
+    poses_n, fitness_n, _ = icp_to(target, settings).register(source, starts_n)
+    theirs_n, fitness_o_n, _ = BatchedICP(target, settings, estimate_normals(target)).register(source, starts_n)
+    assert np.median(np.abs(poses_n - theirs_n).max(axis=(1, 2))) < 5e-3
+    assert fitness_n == pytest.approx(fitness_o_n, abs=0.02)

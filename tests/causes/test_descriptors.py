@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-import gpca.causes.descriptors as module
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.causes.descriptors import (
     COLUMNS,
@@ -221,12 +220,12 @@ def test_the_same_pair_has_the_same_numbers_and_another_sample_other_starts(pair
 
 
 def test_the_remedies_run_as_often_as_their_settings_say(monkeypatch, pair):
-    counted, settings, real = [], DescriptorSettings(starts=2, restarts=5, icp_points=64), module.BatchedICP.register
+    counted, settings, real = [], DescriptorSettings(starts=2, restarts=5, icp_points=64), BatchedICP.register
 
     def register(icp, moving, starts_n):
         counted.append(len(starts_n))
         return real(icp, moving, starts_n)
 
-    monkeypatch.setattr(module.BatchedICP, "register", register)
+    monkeypatch.setattr(BatchedICP, "register", register)
     describe_remedied(pair, settings, ICP)
     assert sum(counted) == settings.remedy_calls

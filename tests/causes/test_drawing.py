@@ -113,12 +113,10 @@ def test_symmetric_objects_are_judged_by_the_shape(four, monkeypatch):
     assert [subject.symmetric for subject in subjects] == [True, False, False, False]
 
 
-def test_a_single_object_and_a_method_that_needs_normals_are_refused(four):
+def test_a_single_object_is_refused(four):
     one = replace(four, names=four.names[2:3], diameters_m=four.diameters_m[2:3], clouds=four.clouds[2:3])
     with pytest.raises(InputError, match="causes of one: has objects of one family alone, which cannot be split"):
         draw_causes(one, "one", 100, CauseSettings(**FEW))
-    with pytest.raises(InputError, match="ICP method 'point_to_plane': the target has no normals; use point_to_point"):
-        draw_causes(four, "four", 100, CauseSettings.from_dict(FEW, {"method": "point_to_plane"}))
 
 
 def test_what_fails_without_a_cause_is_drawn_of_other_objects_for_each_split(four):

@@ -28,6 +28,7 @@ STEPS = {  # module of gpca.steps -> the steps that it has, functions of their n
     "scan_causes": "scan_causes=measure diagnose_scans=diagnose",
     "scans": "draw_scans",
     "shift": "shift learners=fit_learners",
+    "shifts": "draw_shift=draw observe_shift=observe diagnose_shifts=diagnose",
 }
 MODULES = {  # modules with a function ``run``
     **{name: f"gpca.steps.{name}" for name in ("exchange", "frame_labels", "gradients", "guarantee", "kernel_grid")},

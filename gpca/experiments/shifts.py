@@ -1,0 +1,289 @@
+"""Causes of failed registrations whose truth differs from what explainers learn (Table IX, shift)."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Annotated, Any
+from warnings import catch_warnings
+
+import numpy as np
+
+from gpca.attribution.predictions import read_predictions
+from gpca.causes.dataset import Causes
+from gpca.causes.judged import CEILING, MEASURES, Judged, ceiling_of, counted, joined, judged_by, measure
+from gpca.causes.settings import Calls
+from gpca.declarations.experiment import Experiment, LeftOut, Names
+from gpca.declarations.plan import Run
+from gpca.declarations.result import Frame, Paths, numbers, table
+from gpca.declarations.step import Plan, Step, Wildcards
+from gpca.encoders.registry import encoder_module
+from gpca.errors import InputError, with_key
+from gpca.evaluation.intervals import ANYTHING, REPEATS, UNTRAINED, Clustered
+from gpca.evaluation.measures import POOLED, Rivals, compared, intervals
+from gpca.experiments.cause_tables import AGAIN, SECTION, SHOWN
+from gpca.experiments.diagnosis import CAUSES_FILES, TABLE
+from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module
+from gpca.io.container import require_same_samples
+from gpca.reporting.sheet import Row, Sheet, Show, show
+from gpca.reporting.tables.cells import plain_cell
+from gpca.reporting.tables.table import Cell
+from gpca.reporting.words import plural
+from gpca.seeds import seed_of_file
+from gpca.settings import Bounds, Count, Distinct, read_settings
+from gpca.steps.shifts import LABELS, STANDARD, Shift
+
+NAME = "cause_shifts"
+MEAN, DROP = "mean", "drop"  # over the shifts, and by how much it is below the truth that was learned
+METRICS = ("balanced_accuracy", "auroc_failed", "false_alarm_rate", "dominant_accuracy", "regret")
+
+
+@dataclass(frozen=True)
+class Section:
+    """Shifted truths, and the explainers of causes that are asked about them."""
+
+    sources: Distinct[str]
+    explainers: Distinct[str]
+    truths: dict[str, dict]
+    seeds: Count
+    test: Annotated[int, Bounds(minimum=6)]
+    candidates: Calls
+
+
+def check(config: dict, _left_out: LeftOut) -> None:
+    for name, entry in config[NAME]["truths"].items():
+        key = f"{NAME}.truths.{name}"
+        if name in (STANDARD, MEAN, DROP):
+            raise InputError(f"config key {key}", "is a word of the table", "choose another name")
+        with_key(key, lambda entry=entry: read_settings(Shift, entry).truth(config["causes"], {}))
+
+
+def shifts(config: Mapping[str, Any]) -> dict[str, str]:
+    """Titles of the shifts by name."""
+    return {name: entry["title"] for name, entry in config[NAME]["truths"].items()}
+
+
+EXPERIMENT = Experiment(
+    name="shifts",
+    sections={NAME: Section},
+    names=lambda config, sources: {
+        "shift": list(shifts(config)),
+        "shift_source": list(config[NAME]["sources"]),
+        "shift_seed": list(config["seeds"])[: config[NAME]["seeds"]],
+    },
+    needs=("shift",),
+    check=check,
+    optional_entries={f"{NAME}.truths": Names("shift")},
+    lists={f"{NAME}.sources": "sources", f"{NAME}.explainers": "diagnosis.explainers"},
+)
+
+
+def _settings(plan: Plan, wildcards: Wildcards) -> dict[str, Any]:
+    section = plan.config[NAME]
+    drawn = {name: section[name] for name in ("test", "candidates")}
+    shared = {"causes": plan.config["causes"], "icp": plan.config["registrations"]["icp"], "drawn": drawn}
+    return shared | {"shift": section["truths"][wildcards.shift]}
+
+
+OF_SHIFT = "{shift}/{what}/{*shift_source}/seed{*shift_seed}.npz"
+EACH = {name: f"cause_shifts/{OF_SHIFT}".replace("{what}", name) for name in ("causes", "descriptors", "reenactments")}
+DRAW = Step(
+    name="draw_shift",
+    run="gpca.steps.shifts:draw",
+    inputs={"objects": "objects/{*shift_source}.npz"},
+    outputs={"causes": EACH["causes"]},
+    settings=_settings,
+)
+OBSERVE = Step(
+    name="observe_shift",
+    run="gpca.steps.shifts:observe",
+    inputs={"causes": EACH["causes"]},
+    outputs={"descriptors": EACH["descriptors"], "reenactments": EACH["reenactments"]},
+    settings=lambda plan, wildcards: {
+        **_settings(plan, wildcards),
+        **{name: plan.config["diagnosis"][name] for name in ("descriptors", "reenactment")},
+    },
+)
+DIAGNOSE = Step(
+    name="diagnose_shifts",
+    run="gpca.steps.shifts:diagnose",
+    inputs={
+        **{name: f"{name}/{{*source}}/seed{{seed}}.npz" for name in EACH},
+        "encoders": "cause_encoders/{*source}/seed{seed}.pt",
+        "embeddings": "cause_embeddings/{*source}/seed{seed}.npz",
+        **{
+            f"shifted_{name}": files.replace("{shift}", "{*shift}").replace("{*shift_seed}", "{seed}")
+            for name, files in EACH.items()
+        },
+    },
+    outputs={"predictions": "cause_shifts/diagnoses/seed{seed}.csv"},
+    settings=lambda plan, wildcards: {
+        **plan.config["diagnosis"],
+        "explainers": {name: plan.config["diagnosis"]["explainers"][name] for name in plan.config[NAME]["explainers"]},
+    },
+    params={"source": NAME, "sources_asked": lambda plan, wildcards: list(plan.config[NAME]["sources"])},
+    modules=lambda plan: [
+        encoder_module(plan.config["diagnosis"]["encoder"]),
+        *(explainer_module(name, CAUSES) for name in plan.config[NAME]["explainers"]),
+    ],
+)
+
+
+def trained(name: str) -> bool:
+    """Whether an explainer learns and reads no re-enactment: a rival of what needs no training."""
+    return name != CEILING and name not in UNTRAINED and "reenactment" not in explainer_entry(name, CAUSES).sees
+
+
+@numbers(
+    "shifts.csv",
+    prediction_files="cause_shifts/diagnoses/seed{shift_seed}.csv",
+    causes_files=CAUSES_FILES.replace("{source}", "{shift_source}").replace("{seed}", "{shift_seed}"),
+    shifted_files="cause_shifts/{shift}/causes/{shift_source}/seed{shift_seed}.npz",
+)
+def collect(run: Run, prediction_files: Paths, causes_files: Paths, shifted_files: Paths) -> Frame:
+    """Measures with intervals over families and seeds; the concept is the shift, all sources are pooled."""
+    truths: dict[tuple[str, str, int], Causes] = {}
+    for name, paths in ((STANDARD, causes_files), ("", shifted_files)):
+        for file in map(Path, paths):
+            source, seed = file.parent.name, seed_of_file(file)
+            causes = Causes.load(file, (source, seed))
+            truths[name or file.parts[-4], source, seed] = causes.subset(causes.rows("test"))
+    judged: dict[str, dict[tuple[str, str, int], Judged]] = {
+        CEILING: {key: ceiling_of(truth, key[2]) for key, truth in truths.items()}
+    }
+    for path in prediction_files:
+        seed = seed_of_file(path)
+        for (shift, source, explainer), rows in read_predictions(path, labels=LABELS).groupby(list(LABELS), sort=False):
+            truth = truths[shift, source, seed]
+            require_same_samples(path, rows, truth.registrations.arrays, "causes", ("sample",))
+            judged.setdefault(str(explainer), {})[shift, source, seed] = judged_by(rows, truth, seed)
+    order = list(dict.fromkeys(shift for shift, _, _ in truths))
+    return intervals(measured({name: _by_shift(each, order) for name, each in judged.items()}), "shifts")
+
+
+def _by_shift(judged: Mapping[tuple[str, str, int], Judged], order: list[str]) -> dict[str, Judged]:
+    return {shift: joined(judged[key] for key in sorted(judged) if key[0] == shift) for shift in order}
+
+
+def measured(judged: Mapping[str, Mapping[str, Judged]]) -> list[tuple]:
+    """Rows of all measures, of samples by explainer and shift: of each shift, of the mean over them, and its `DROP`."""
+    first = next(iter(judged.values()))
+    whole = joined(first.values())
+    draws = Clustered.drawn(whole.seed, whole.instance, "shift intervals")
+    shift_N = np.repeat(list(first), [len(each) for each in first.values()])
+    values = {
+        name: _with_mean({shift: measure(each, draws.weights[:, shift_N == shift]) for shift, each in of.items()})
+        for name, of in judged.items()
+    }
+    rows = []
+    for part, metric in product((*first, MEAN, DROP), METRICS):
+        inside_N = shift_N == part if part in first else shift_N != STANDARD
+        how, subset = MEASURES[metric], draws.subset(inside_N & counted(whole, metric))
+        value = {name: of[part][metric] for name, of in values.items() if metric in of[part]}
+        limits = ANYTHING if part == DROP else how.limits
+        against = {} if part == DROP else AGAINST
+        rows += compared((TABLE, POOLED), metric, part, value, subset, limits, against, how.least_is_best)
+    return rows
+
+
+AGAINST: Mapping[str, Rivals] = {
+    "trained": lambda name, names: () if name == CEILING else [other for other in names if trained(other)]
+}
+
+
+def _with_mean(by_shift: dict[str, dict[str, np.ndarray]]) -> dict[str, dict[str, np.ndarray]]:
+    shifted = [of for shift, of in by_shift.items() if shift != STANDARD]
+    with catch_warnings(category=RuntimeWarning, action="ignore"):  # of draws in which no shift has a measure
+        mean = {metric: np.nanmean([of[metric] for of in shifted], axis=0) for metric in shifted[0]}
+    return by_shift | {MEAN: mean, DROP: {metric: mean[metric] - by_shift[STANDARD][metric] for metric in mean}}
+
+
+SHOWN_OF_SHIFTS = {
+    "standard": show("balanced_accuracy", "As learned (%)", STANDARD),
+    MEAN: show("balanced_accuracy", "Mean over shifts (%)", MEAN),
+    DROP: show("balanced_accuracy", "Change (points)", DROP, limits=(-100.0, 100.0)),
+    "lead": show(
+        "balanced_accuracy", "Over trained (points)", MEAN, where={"against": "trained"}, limits=(-100.0, 100.0)
+    ),
+    "false_alarm_rate": show("false_alarm_rate", "False alarms (%)", MEAN, least_is_best=True),
+    "auroc_failed": show("auroc_failed", "AUROC", MEAN, factor=1, decimals=3, limits=(0.0, 1.0)),
+}
+
+
+def knows(name: str) -> str:
+    """What an explainer knows of the generator that the samples of Table IX are drawn by."""
+    if name in UNTRAINED[:2]:
+        return "nothing"
+    if name in UNTRAINED:
+        return "its limits"
+    sees = explainer_entry(name, CAUSES).sees
+    further = ["its starts and limits, and every registration method"] if "reenactment" in sees else []
+    learned = ["its samples"] if name != "reenact" else []
+    return "; ".join([*learned, *further])
+
+
+@table(
+    SECTION,
+    "Table IX, shift",
+    """The explainers of Table IX, trained on its samples, are asked about registrations whose truth is generated in
+    other ways: other occlusion, registration methods, models, noise, clutter, and the other cloud moved.""",
+    after="table9_shown",
+    measures="shifts.csv",
+)
+def table9_shift(run: Run, measures):
+    names = list(run.config[NAME]["explainers"])
+    rows = [
+        Row([(name, explainer_entry(name, CAUSES).title), (words := knows(name), words)], {"method": name})
+        for name in names
+    ]
+    rows.append(Row([(CEILING, AGAIN[CEILING]), ("truth",) * 2], {"method": CEILING}, rival=False))
+    sheet = Sheet("table9_shift", {"explainer": "Explainer", "knows": "Knows"}, rows, SHOWN_OF_SHIFTS, measures)
+    titles = ", ".join(shifts(run.config).values())
+    return sheet.table(
+        "Causes of failure under shifts of the truth" + run.stand_ins(),
+        "metric",
+        [
+            f"As learned: balanced accuracy on the test samples of Table IX. Mean over shifts: {titles}. Over trained: "
+            "the mean minus that of the best other explainer that is trained and reads no re-enactment, on the same "
+            "draws. False alarms and AUROC are means over the shifts, too.",
+            "Knows: what is known of the generator of Table IX. Its samples: those that are learned from, of all "
+            "sources together. Of a shift, the re-enactment is given the method and which cloud moved alone.",
+            f"{sheet.over()} ({REPEATS} draws).",
+        ],
+        bold=[key for key in SHOWN_OF_SHIFTS if key not in (DROP, "lead")],
+    )
+
+
+@table(
+    SECTION,
+    "Table IX, shift by shift",
+    """Balanced accuracy under each shift of the truth, and the lead of the re-enactment without training over the best
+    explainer that is trained and reads no re-enactment.""",
+    after="table9_shift",
+    measures="shifts.csv",
+)
+def table9_shifts(run: Run, measures):
+    titles = {STANDARD: "As learned"} | shifts(run.config) | {MEAN: "Mean over shifts"}
+    names = {name: explainer_entry(name, CAUSES).title for name in run.config[NAME]["explainers"]}
+    columns: dict[str, Show] = {
+        name: Show(f"{title} (%)", where={"metric": "balanced_accuracy", "method": name, "against": ""}, interval=False)
+        for name, title in names.items()
+    }
+    lead = {"metric": "balanced_accuracy", "method": "reenact", "against": "trained"}
+    columns["lead"] = Show("Lead of the re-enactment (points)", where=lead, limits=(-100.0, 100.0))
+    rows = [Row([each], {"concept": each[0]}) for each in titles.items()]
+
+    def counts(row: Row, subset: Frame) -> dict[str, Cell]:
+        return {"samples": plain_cell(n := int(subset["samples"].max()), int(subset["seeds"].max()), n)}
+
+    shown = {"samples": SHOWN["samples"]} | columns
+    sheet = Sheet("table9_shifts", {"shift": "Truth"}, rows, shown, measures, more=counts)
+    return sheet.table(
+        "Balanced accuracy by shift of the truth" + run.stand_ins(),
+        "metric",
+        [
+            f"n: judged samples. In brackets: the 95 % interval of a bootstrap over families and seeds ({REPEATS} "
+            f"draws), over {plural(sheet.seeds, 'seed')}. Bold: best explainer under a shift."
+        ],
+        bold_across=list(names),
+    )

@@ -1,0 +1,111 @@
+"""The steps of shifted truths, from the drawing of samples to the table."""
+
+import pytest
+
+from gpca.attribution.predictions import read_predictions
+from gpca.causes.dataset import Causes
+from gpca.evaluation.measures import AGAINST, KEYS, NUMBERS
+from gpca.experiments import shifts as experiment
+from gpca.jobs.job import Job
+from gpca.reenactment.dataset import Reenactments
+from gpca.steps import shifts as step
+from gpca.steps.diagnosis import training_rows
+from tests.conftest import FEW_CAUSES
+from tests.experiments.runs import run_with
+
+EXPLAINERS = {"most_frequent": None, "residuals": None, "reenact": None}
+NAMES = ("causes", "descriptors", "reenactments")
+TRUTHS = {
+    "scaled": {"title": "Scaled", "causes": {"form": {"scale": 0.02}}},
+    "planes": {"title": "Planes", "method": "point_to_plane"},
+}
+RUN = run_with(
+    sources={"four": {"title": "Four", "kind": "procedural"}},
+    cause_shifts={"explainers": list(EXPLAINERS), "truths": TRUTHS, "sources": ["four"]},
+)
+
+
+@pytest.fixture(scope="module")
+def folder(four, causes, tmp_path_factory):
+    """Files of a run with two shifts: what is learned, what is asked about, and the answers."""
+    folder = tmp_path_factory.mktemp("shifts")
+    four.save(folder / "four.npz", "four")
+    causes.save(folder / "standard/causes/four/seed100.npz")
+    reads = {"descriptors": {"starts": 1, "restarts": 2, "icp_points": 64}, "reenactment": {"hypotheses": 2}}
+    for shift in ("standard", *TRUTHS):
+        files = {name: [folder / shift / name / "four/seed100.npz"] for name in NAMES}
+        settings = {
+            "causes": FEW_CAUSES | {"points": list(FEW_CAUSES["points"])},
+            "drawn": {"test": 6, "candidates": 6},
+            "shift": TRUTHS.get(shift, {"title": "Standard"}),
+            **reads,
+        }
+        if shift in TRUTHS:
+            step.draw(Job(settings=settings, objects=[folder / "four.npz"], causes=files["causes"]))
+        step.observe(Job(settings=settings, **files))
+    learned = {name: [folder / "standard" / name / "four/seed100.npz"] for name in NAMES}
+    asked = {f"shifted_{name}": [folder / shift / name / "four/seed100.npz" for shift in TRUTHS] for name in NAMES}
+    step.diagnose(
+        Job(
+            **learned,
+            **asked,
+            **{"encoders": [], "embeddings": [], "source": "cause_shifts", "seed": 100, "sources_asked": ["four"]},
+            settings={"explainers": EXPLAINERS, **reads, "encoder": {}},
+            predictions=folder / "diagnoses/seed100.csv",
+        )
+    )
+    return folder
+
+
+def truth_files(folder):
+    return [[folder / shift / "causes/four/seed100.npz" for shift in names] for names in (["standard"], TRUTHS)]
+
+
+def test_every_explainer_answers_for_the_test_samples_of_every_shift(folder):
+    rows = read_predictions(folder / "diagnoses/seed100.csv", labels=step.LABELS)
+    assert set(rows["explainer"]) == set(EXPLAINERS)
+    for shift in ("standard", *TRUTHS):
+        causes = Causes.load(folder / shift / "causes/four/seed100.npz")
+        tested = causes.registrations.sample[causes.rows("test")]
+        answers = rows[(rows["shift"] == shift) & (rows["explainer"] == "reenact")]
+        assert answers["sample"].astype(int).tolist() == tested.tolist()
+        verdict = Reenactments.load(folder / shift / "reenactments/four/seed100.npz").verdict[causes.rows("test")]
+        assert answers["score_nominal"].to_numpy() == pytest.approx(verdict[:, 0], abs=1e-5)
+
+
+def test_nothing_is_learned_from_families_that_are_asked_about(folder, causes):
+    asked = [step.Asked("", "four", causes, {})]
+    every = asked[0].registrations()
+    learned = {"causes": [folder / "standard/causes/four/seed100.npz"]}
+    learned |= {"descriptors": [folder / "standard/descriptors/four/seed100.npz"]}
+    job = Job(source="x", seed=100, settings={"encoder": {}, "descriptors": {}, "reenactment": {}})
+    families = {}
+    for apart in (False, True):
+        # Even where a training family is asked about as well.
+        both = causes.registrations
+        world = step.World(job, learned, step.labeled(causes), 13, lambda reads: step.labeled(causes), apart=apart)
+        ((training, _),) = world.prepare("residuals")
+        families[apart] = set(training.cluster)
+    assert families[False] == set(both.cluster[training_rows(step.labeled(causes), "")]) and not families[True]
+    assert not families[False] & set(every.cluster)
+
+
+def test_measures_are_of_each_shift_and_of_their_mean(folder):
+    rows = experiment.collect(RUN, [folder / "diagnoses/seed100.csv"], *truth_files(folder))
+    assert list(rows.columns) == [*KEYS, *AGAINST, *NUMBERS]
+    of = rows[(rows["metric"] == "false_alarm_rate") & (rows["against"] == "")].set_index(["method", "concept"])[
+        "value"
+    ]
+    for name in EXPLAINERS:
+        assert of[name, "mean"] == pytest.approx((of[name, "scaled"] + of[name, "planes"]) / 2)
+        assert of[name, "drop"] == pytest.approx(of[name, "mean"] - of[name, "standard"])
+    leads = rows[rows["against"] == "trained"]
+    assert set(leads["other"]) == {"residuals"} and "ceiling" not in set(leads["method"])
+
+
+def test_both_tables_show_all_explainers_and_shifts(folder):
+    rows = experiment.collect(RUN, [folder / "diagnoses/seed100.csv"], *truth_files(folder))
+    whole, by_shift = experiment.table9_shift(RUN, rows).markdown(), experiment.table9_shifts(RUN, rows).markdown()
+    assert "| Re-enactment (untrained) | its starts and limits, and every registration method |" in whole
+    assert "| nothing |" in whole and "| its samples |" in whole
+    assert all(f"| {title} |" in by_shift for title in ("As learned", "Scaled", "Planes", "Mean over shifts"))
