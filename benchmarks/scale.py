@@ -3,6 +3,7 @@
     python benchmarks/scale.py results/full [--configfile config/full.yaml] [--config data_dir=/data] [--cores 1 2 4 8]
     python benchmarks/scale.py results/full --sources 100 --seeds 10 --explainers 20 [--write docs/cluster.md]
     python benchmarks/scale.py results/default --expect config/full.yaml [--given train_encoder=2x readings/pool=90s]
+    python benchmarks/scale.py results/full --expect config/full.yaml --means
     python benchmarks/scale.py results/default --times
 
 The first form schedules the jobs of a finished run, each with the seconds of its benchmark file, on several
@@ -14,6 +15,7 @@ the seeds. A rule that was not measured counts as the mean of the others, in the
 datasets is left out, as its cost grows with the square of their number. The third schedules another config before it is
 run, with jobs that grow in the same way. Where its sizes differ too, --given says by what factor the jobs of a rule or
 a benchmark file grow besides, or how many seconds they take; names may be patterns, and the last one that fits counts.
+With --means the run need not be there: its jobs take the mean seconds of their rule in workflow/measured_times.csv.
 --write puts the tables between the comments that the page has for the run, --times the mean seconds of each rule into
 workflow/measured_times.csv, by which a run tells its time left. The last line is a JSON object: speedup_<cores>,
 critical_s, core_min; and jobs, submitted, core_h, longest_s, results, plan_s, plan_mb.
@@ -57,6 +59,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--cores", type=int, nargs="+", default=[1, 2, 4, 8, 16], help="default 1 2 4 8 16")
     parser.add_argument("--rules", type=int, default=0, help="show the rules that take most, so many; default none")
     parser.add_argument("--expect", type=Path, metavar="CONFIG", help="config of a run that has not been made")
+    parser.add_argument("--means", action="store_true", help="with --expect, take the times that the checkout keeps")
     parser.add_argument("--given", nargs="+", default=[], metavar="NAME=VALUE", help="factor (2x) or seconds (90s)")
     parser.add_argument(
         "--sources", type=int, default=0, help="number of datasets of the larger run; by default none is planned"
@@ -67,15 +70,16 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--times", action="store_true", help="write the mean seconds of each rule for later runs")
     options = parser.parse_args(arguments)
     try:
-        run = name_of_run(options.folder)
-        jobs = read_plan(plan(run, options.configfile, options.config), run)
-        seconds = measured(jobs, options.folder)
+        run = options.folder.name if options.means else name_of_run(options.folder)
+        expected = read_plan(plan(RUN, options.expect, []), RUN) if options.expect else []
+        jobs = expected if options.means else read_plan(plan(run, options.configfile, options.config), run)
+        seconds = of_rules(jobs, run) if options.means else measured(jobs, options.folder)
         if options.times:
             write_times(TIMES, run, jobs, seconds)
         planned, taken = jobs, seconds
         if options.expect:
-            planned = read_plan(plan(RUN, options.expect, []), RUN)
-            taken = given(planned, estimated(jobs, seconds, planned), options.given)
+            planned = expected
+            taken = given(planned, seconds if options.means else estimated(jobs, seconds, planned), options.given)
         lines, found = on_cores(planned, taken, options.cores)
         if options.rules:
             lines += ["", *by_rules(planned, taken, options.rules)]
@@ -110,6 +114,16 @@ def measured(jobs: Sequence[Job], folder: Path) -> dict[str, float]:
         else:
             raise InputError(folder, f"has no {job.benchmark}", "finish the run, or give its --configfile and --config")
     return seconds
+
+
+def of_rules(jobs: Sequence[Job], run: str) -> dict[str, float]:
+    """Return the seconds of each job: the mean of its rule in a run, or else in any; of all rules if in none."""
+    times = read_times(TIMES)
+    if run not in times:
+        raise InputError(TIMES, f"has no times of a run {run}", f"give one of {', '.join(times)}")
+    others = {rule: mean_s for by_rule in times.values() for rule, mean_s in by_rule.items()}
+    mean_s = fmean(times[run].values())
+    return {job.benchmark: times[run].get(job.rule, others.get(job.rule, mean_s)) for job in jobs}
 
 
 def write_times(path: Path, run: str, jobs: Sequence[Job], seconds: Mapping[str, float]) -> None:

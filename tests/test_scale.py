@@ -90,6 +90,14 @@ def test_a_run_that_was_not_made_is_expected_from_the_times_of_its_rules(run_fol
     lines = capsys.readouterr().out.splitlines()
     assert any(line.startswith("| `train_encoder` | ") and line.endswith(" | 1.5 |") for line in lines)
     assert json.loads(lines[-1])["core_min"] > same["core_min"]
+    # By the times of the checkout no run has to be there.
+    absent = [str(tmp_path / "full"), "--expect", str(tmp_path / "other.yaml"), "--means"]
+    assert scale.main(absent) == 0
+    kept = json.loads(capsys.readouterr().out.splitlines()[-1])["core_min"]
+    assert scale.main([*absent, "--given", "train_*=1000x"]) == 0
+    assert json.loads(capsys.readouterr().out.splitlines()[-1])["core_min"] > kept > 0
+    assert scale.main([str(tmp_path / "other"), *absent[1:]]) == 2
+    assert "has no times of a run other" in capsys.readouterr().err
     for value, fault in {"page=2": "is no factor or time", "no_rule=2x": "names no job of the plan"}.items():
         assert scale.main([*expect, "--given", value]) == 2
         assert f"--given {value}: {fault}; " in capsys.readouterr().err
