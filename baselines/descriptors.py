@@ -9,7 +9,7 @@ in the order of cost; runs from other starts and remedies without restarts cost 
 ``alarm_*`` say whether two clouds are aligned, and name no cause. ``alarm_entropies`` is CorAl (Adolfsson et al. 2021):
 a regression on the mean entropy of the clouds, joint and apart. ``alarm_features`` reads features like FACT's (Dillén,
 Forssén & Edstedt 2025): local features of both aligned clouds, their distances, and the share seen in both; boosted
-trees replace its network. ``reenact`` and ``reenact_committee`` read a re-enactment of the pair (docs/reenactment.md).
+trees replace its network. ``reenact`` and ``reenact_committee`` read a re-enactment of the pair (docs/causes.md).
 """
 
 from collections.abc import Callable

@@ -1,7 +1,7 @@
 """How many epochs an encoder needs: accuracy and loss of trainings of different lengths, on development objects.
 
     python benchmarks/convergence.py [registrations/…/seed*.npz] [causes/…/seed*.npz] [--backbones dgcnn pointnet]
-        [--epochs 3 6 12 24 48] [--out convergence.csv] [--write docs/protocol.md]
+        [--epochs 3 6 12 24 48] [--out convergence.csv] [--write docs/appendix.md]
 
 Each length is a training of its own, since the one-cycle schedule spans it; one that was ended resumes. Files are
 registrations of development objects, or those with measured causes (`snakemake … --configfile
@@ -148,7 +148,7 @@ def mean(by_seed: dict[str, dict], measure: str) -> float:
 
 
 def moves(longer: dict[str, dict], shorter: dict[str, dict]) -> bool:
-    """Return whether the longer training is better, in its loss or in an accuracy, by the rule of docs/protocol.md."""
+    """Return whether the longer training is better, in its loss or in an accuracy, by the rule of docs/appendix.md."""
     import numpy as np
 
     seeds = sorted(set(longer) & set(shorter))

@@ -1,7 +1,7 @@
 """Where the time of a run goes, stage by stage, and how much of it is the workflow's own.
 
     python benchmarks/pipeline.py [--configfile config/smoke.yaml] [--cores 2] [--config data_dir=/data]
-    python benchmarks/pipeline.py --existing full [--write docs/reproducing.md]
+    python benchmarks/pipeline.py --existing full [--write docs/appendix.md]
 
 The first form makes everything afresh as the run `benchmark` (results/benchmark is removed first) and takes the wall
 time with a clock; without --configfile it is the default run. The second only reads the files of a run that is

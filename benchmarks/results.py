@@ -3,7 +3,7 @@
     python benchmarks/results.py CAUSES:REENACTMENTS … [NAME=CAUSES:REENACTMENTS …]
 
 Each argument names two files of a run, such as results/full/model_causes/ycb/seed0.npz and the file of the same name
-below model_reenactments/. docs/guarantee.md has the protocol. `clear` leaves out errors between two thirds of the
+below model_reenactments/. docs/appendix.md has the protocol. `clear` leaves out errors between two thirds of the
 tolerance and the tolerance; `far` are starts that are 30 to 60° off, and what has a name is shown apart. The mean over
 the starts is judged by its own alarm. The last line is a JSON object of the trained judge at 3 %: samples,
 good, families, auroc, auroc_clear, false_alarms, missed, covered (by sets of 90 %), and each again for far starts, as

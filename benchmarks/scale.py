@@ -1,7 +1,7 @@
 """What a run scales to: more cores for the same run, and more datasets, seeds and explainers on a cluster.
 
     python benchmarks/scale.py results/full [--configfile config/full.yaml] [--config data_dir=/data] [--cores 1 2 4 8]
-    python benchmarks/scale.py results/full --sources 100 --seeds 10 --explainers 20 [--write docs/cluster.md]
+    python benchmarks/scale.py results/full --sources 100 --seeds 10 --explainers 20 [--write docs/appendix.md]
     python benchmarks/scale.py results/default --expect config/full.yaml [--given train_encoder=2x readings/pool=90s]
     python benchmarks/scale.py results/full --expect config/full.yaml --means
     python benchmarks/scale.py results/default --times

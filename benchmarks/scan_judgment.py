@@ -2,7 +2,7 @@
 
     python benchmarks/scan_judgment.py --data /data [--pairs 4] [--out judged.csv] [--from judged.csv]
 
-The protocol is in docs/scans.md. Prints AUROC, false alarms, missed failures and how often overlap is named, with
+The protocol is in docs/appendix.md. Prints AUROC, false alarms, missed failures and how often overlap is named, with
 Wilson's intervals, and the coefficients that a logistic regression fits to the evidence, with its AUROC over scenes
 that it was not fitted to. The last line is a JSON object.
 """

@@ -1,7 +1,7 @@
 """What each table and figure of a finished run takes: jobs, core time, wall time, memory.
 
     python benchmarks/targets.py results/full [--configfile config/full.yaml] [--config data_dir=/data] [--cores 2]
-    python benchmarks/targets.py results/full --write docs/reproducing.md
+    python benchmarks/targets.py results/full --write docs/appendix.md
 
 Snakemake's plan of the whole run (a dry run, nothing is made) says which jobs a target needs; the run's benchmark files
 say how long each took and how much memory it held. Core time is the sum over those jobs. Wall time is that of a

@@ -3,7 +3,7 @@
     python benchmarks/undetermined.py [--repeats 2] [--methods likelihood censi]
     python benchmarks/undetermined.py --scale [--repeats 6]
 
-Protocols: docs/undetermined.md. The last line is a JSON object: auroc_, named_, unnamed_ and ms_<method>, or the shares
+Protocols: docs/appendix.md. The last line is a JSON object: auroc_, named_, unnamed_ and ms_<method>, or the shares
 of false alarms and of found scales.
 """
 

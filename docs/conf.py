@@ -17,7 +17,7 @@ project = "GP-CA Bench"
 version = release = gpca.__version__
 html_title = f"{project} {release}"
 html_theme = "furo"
-root_doc = "docs/README"
+root_doc = "README"
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_gallery.gen_gallery"]
 
 EXECUTED = "build/docs/executed"  # where the tutorial is put as it ran
@@ -55,12 +55,12 @@ napoleon_numpy_docstring = False
 
 
 def with_menu(_app, name: str, source: list[str]) -> None:
-    """Lead to the tutorial as it ran, and give the index a table of contents for the menu beside each page."""
-    source[0] = source[0].replace("](tutorial.py)", f"](../{EXECUTED}/tutorial.rst)")
+    """Lead to the tutorial as it ran, and give the first page a table of contents for the menu beside each page."""
+    source[0] = re.sub(r"\]\((?:docs/)?tutorial\.py\)", f"](/{EXECUTED}/tutorial.rst)", source[0])
     if name != root_doc:
         return
-    parts = re.split(r"^## (.+)$", source[0], flags=re.MULTILINE)
-    for head, text in zip(parts[1::2], parts[2::2], strict=True):
+    rows = re.findall(r"^\| (.+?) \| (.*\]\(docs/.*) \|$", source[0].split("## Documentation")[1], flags=re.MULTILINE)
+    for head, text in rows:
         pages = re.findall(r"\]\(([\w./]+)\.(?:md|rst)\)", text)
         source[0] += "\n".join(["", "```{toctree}", ":hidden:", f":caption: {head}", "", *pages, "```", ""])
 

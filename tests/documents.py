@@ -17,7 +17,7 @@ def our_files():
         folders[:] = sorted(name for name in folders if name in kept and (name[0] != "." or name in HIDDEN))
         for name in sorted(name for name in names if name[0] != "." or name in HIDDEN):
             path = Path(folder, name)
-            if path.suffix not in {".png", ".pdf", ".ply", ".npz", ".pt", ".log", ".so"}:
+            if path.suffix not in {".png", ".pdf", ".npz", ".pt", ".log", ".so", ".ply"}:
                 yield path
 
 

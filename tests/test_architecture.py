@@ -10,7 +10,7 @@ from gpca.declarations.registry import steps as declared_steps
 
 from .documents import ROOT
 
-PAGE = (ROOT / "docs/architecture.md").read_text()
+PAGE = "\n".join((ROOT / f"docs/{page}.md").read_text() for page in ("architecture", "appendix"))
 LONGEST = 400  # lines
 MOST_AT_THE_TOP = 24  # modules
 MODULES = sorted([*(ROOT / "gpca").rglob("*.py"), *(ROOT / "baselines").rglob("*.py")])

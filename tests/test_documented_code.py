@@ -4,10 +4,11 @@ import re
 import runpy
 
 import numpy as np
-import pytest
 
+from gpca.__main__ import main
 from gpca.evaluation.conformal import OUTCOMES
 from gpca.guarantee.guarantee import STATES
+from gpca.model.location import SHIPPED
 
 from .documents import ROOT
 
@@ -22,19 +23,18 @@ def run_example(page, registrations, **given):
     return names
 
 
-@pytest.mark.parametrize("page", ["quick_start", "explain"])
-def test_the_python_of_a_page_runs(page, model, registrations, tmp_path, monkeypatch, capsys):
+def test_the_python_of_the_page_of_explanations_runs(model, registrations, tmp_path, monkeypatch, capsys):
     model.save(tmp_path / "model.pt")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("GPCA_MODEL", str(tmp_path / "model.pt"))
-    run_example(page, registrations)
+    run_example("explain", registrations)
     assert set(capsys.readouterr().out.split()) & {"nominal", "failed", "noise", "pose", "overlap"}
 
 
-@pytest.mark.parametrize(("page", "start"), [("registration", "True "), ("estimators", "[[")])
-def test_the_python_of_the_pages_of_methods_and_estimators_runs(page, start, registrations, capsys):
-    run_example(page, registrations)
-    assert capsys.readouterr().out.startswith(start)
+def test_the_python_of_the_page_of_methods_and_estimators_runs(registrations, capsys):
+    run_example("registration", registrations)
+    fine, estimate = capsys.readouterr().out.split("\n", 1)
+    assert fine.startswith("True ") and estimate.startswith("[[")
 
 
 def test_the_python_of_the_page_of_guarantees_runs(registrations):
@@ -43,6 +43,16 @@ def test_the_python_of_the_page_of_guarantees_runs(registrations):
     names = run_example("guarantee", registrations, state_N=np.resize(STATES, 200), **given)
     assert names["same"] == names["guarantee"] and names["inside_M_5"].shape == (200, 5)
     assert set(names["called_M"]) <= set(OUTCOMES)
+
+
+def test_the_readme_shows_what_its_first_command_answers(monkeypatch, capsys):
+    monkeypatch.chdir(ROOT)
+    monkeypatch.setenv("GPCA_MODEL", str(SHIPPED))
+    text = (ROOT / "README.md").read_text()
+    [command] = re.findall(r"^gpca (explain examples\S+ \S+)$", text, re.MULTILINE)
+    [answer] = re.findall(r"^```text\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    assert main(command.split()) == 0
+    assert set(answer.splitlines()) <= set(capsys.readouterr().out.splitlines())
 
 
 def test_the_tutorial_runs_to_its_end_and_warns_of_the_foreign_scale(model, tmp_path, monkeypatch, capsys):

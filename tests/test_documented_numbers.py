@@ -30,7 +30,7 @@ def test_all_pages_have_the_numbers_of_the_reference(capsys):
 
 @pytest.mark.parametrize(("run", "name"), [("default", "default"), ("full", "full protocol")])
 def test_the_readme_has_the_times_of_the_page_of_all_targets(run, name):
-    page = (ROOT / "docs/reproducing.md").read_text()
+    page = (ROOT / "docs/appendix.md").read_text()
     block = page.split(f"<!-- times of results/{run} -->")[1].split(f"<!-- end of results/{run} -->")[0]
     rows = re.findall(r"^\| `tables/(\w+)\.md` \| \d+ \| [\d.]+ \| ([\d.]+) \|", block, re.MULTILINE)
     minutes = {table: f"{float(wall):.0f}" for table, wall in rows}

@@ -1,4 +1,4 @@
-"""Forms of the truth's generator: what hides surface, how noise is distributed, what the model lacks (docs/shifts.md).
+"""Forms of the truth's generator: what hides surface, how noise spreads, what the model lacks (docs/appendix.md).
 
 Lengths are in diameters. Each form draws from a generator of its own, so that samples of two forms are otherwise alike.
 """

@@ -79,7 +79,7 @@ class Small:
 
 @dataclass(frozen=True)
 class Form:
-    """How the truth is generated, beside the severities; explainers learn the first of each (docs/shifts.md)."""
+    """How the truth is generated, beside the severities; explainers learn the first of each (docs/appendix.md)."""
 
     occlusion: Literal["half_space", "patches", "visibility"] = "half_space"
     noise: Literal["white", "warped", "quantized"] = "white"

@@ -102,7 +102,7 @@ def _method_names(method: str, track: Track) -> list[str]:
 def add_score_arguments(parser: ArgumentParser) -> None:
     add = parser.add_argument
     add("track", help=f"one of {', '.join(TRACKS)}")
-    add("predictions", type=Path, help="CSV with a head of comments (docs/outside.md)")
+    add("predictions", type=Path, help="CSV with a head of comments (docs/adding.md)")
 
 
 def run_score(options: Namespace) -> int:

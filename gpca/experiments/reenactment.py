@@ -1,4 +1,4 @@
-"""Re-enactments: one of them as a figure, and what each part of the truth would add to them (docs/reenactment.md)."""
+"""Re-enactments: one of them as a figure, and what each part of the truth would add to them (docs/causes.md)."""
 
 from dataclasses import dataclass
 from math import inf

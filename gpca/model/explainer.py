@@ -98,7 +98,7 @@ class Explainer:
                 cannot state that nothing is wrong, and then determines the action.
             method: registration method (docs/registration.md) with its default settings; by default, the model's own
                 ICP, on whose results the classifier was trained.
-            estimator: uncertainty estimator (docs/estimators.md) that needs no training registrations. A note states
+            estimator: uncertainty estimator (docs/registration.md) that needs no training registrations. A note states
                 why it failed.
             tolerance: how far the pose may be off: a length, an angle or a share of the diameter, such as ``5mm``.
             register: whether to register; otherwise the initial pose itself is explained, as :meth:`judge` does.

@@ -24,8 +24,8 @@ NOT_SURE = "not sure"
 UNKNOWN_STATUS = 3  # exit code of the command if an explanation means nothing; 1 is a failed check, 2 a bad input
 GIVEN = "given"  # method of a pose that was not registered but judged
 LEARNED = (
-    "the probability of a failure was fitted to scans of development scenes (docs/scans.md); the model, which learned "
-    "from objects, is not used"
+    "the probability of a failure was fitted to scans of development scenes (docs/real_world.md); the model, which "
+    "learned from objects, is not used"
 )
 HEADS = {  # CSS class and title of a state
     NOMINAL: ("good", "Nothing speaks against this registration"),

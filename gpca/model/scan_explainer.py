@@ -1,9 +1,9 @@
 """Explains the registration of two scans of any size without a model.
 
 Both clouds are partial, so classifiers trained on whole objects do not apply. The probability of a failure is a
-logistic regression on two numbers, fitted to development scenes (docs/scans.md). The first is the weight, by their fit,
-of the poses that are farther from the result than the limit. The second is the distance between partners at the result:
-two samples of one surface, one point per voxel, lie about 0.6 voxels apart; surfaces that only cross, about 1.1.
+logistic regression on two numbers, fitted to development scenes (docs/real_world.md). The first is the weight, by their
+fit, of the poses that are farther from the result than the limit. The second is the distance between partners at the
+result: two samples of one surface, one point per voxel, lie about 0.6 voxels apart; crossing surfaces, about 1.1.
 """
 
 from collections.abc import Sequence
@@ -71,7 +71,7 @@ def explain_scans(
             two voxels, whichever is more, but at most 5 % of the target's extent.
         T_target_source: (4, 4) pose to be judged; nothing is registered then. It is the initial pose, too, by default.
         source_unit: unit of the source's points, if another one; they are converted first.
-        estimator: uncertainty estimator (docs/estimators.md) that needs no training registrations; None skips it.
+        estimator: uncertainty estimator (docs/registration.md) that needs no training registrations; None skips it.
 
     Raises:
         InputError: too few points with a measurement, points on one line, a pose that is not rigid, voxels that leave

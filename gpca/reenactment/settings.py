@@ -1,4 +1,4 @@
-"""Settings of the re-enactment (docs/reenactment.md); nothing here needs the code that it runs."""
+"""Settings of the re-enactment (docs/causes.md); nothing here needs the code that it runs."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

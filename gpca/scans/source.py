@@ -1,4 +1,4 @@
-"""Configured data sets of scans: the entry in the config, where its files are, and their readers (docs/scans.md).
+"""Configured data sets of scans: the entry in the config, where its files are, and their readers (docs/real_world.md).
 
 npz: one scene in each file; beside them, ``pairs.csv`` may list pairs. ply_folder: one scene in each folder with
 ``poses.txt``. threedmatch: the benchmark of Zeng et al. 2017 in the layout of Choi et al. 2015, where ``gt.log`` has
@@ -77,7 +77,7 @@ class ScanEntry:
 
 
 PAIRS = "pairs.csv"
-NPZ_REMEDY = "make it as docs/scans.md says"
+NPZ_REMEDY = "make it as docs/real_world.md says"
 NPZ_POSES: dict[str, Kind] = {"T_scene_cloud": "room", "T_model_cloud": "object"}
 NAME_ARRAYS = ("name", "index")
 CLOUD = "cloud_"
@@ -124,7 +124,7 @@ def _read_pairs(path: Path) -> dict[str, tuple[Known, ...]]:
     """Return the pairs that a file lists, by scene, each once; none where there is no file."""
     if not path.is_file():
         return {}
-    rows = read_csv(path, ("scene", "target", "source", "overlap"), ANY, "correct it as docs/scans.md says")
+    rows = read_csv(path, ("scene", "target", "source", "overlap"), ANY, "correct it as docs/real_world.md says")
     rows["overlap"] = numbers(path, rows, "overlap", least=0)
     if (rows["overlap"] > 1).any():
         raise InputError(path, "column 'overlap' contains numbers above 1", "give shares from 0 to 1")
@@ -147,7 +147,7 @@ def ply_scenes(entry: ScanEntry, place: Path) -> Iterator[ScannedScene]:
         raise InputError(entry.title, "does not say what its scenes are", "set scenes: room, or object")
     files = [place / POSES_FILE] if (place / POSES_FILE).exists() else sorted(place.glob(f"*/{POSES_FILE}"))
     if not files:
-        raise InputError(place / POSES_FILE, "no such file", "give the poses of the scans as docs/scans.md says")
+        raise InputError(place / POSES_FILE, "no such file", "give the poses of the scans as docs/real_world.md says")
     for path in files:
         scans = {
             name: entry.scan(read_surface(path.with_name(f"{name}.ply"), entry.scale).vertices_m, T_scene_scan)

@@ -1,1 +1,1 @@
-"""Tracks: fixed samples that methods from anywhere are tested on, beside the published rows; docs/outside.md."""
+"""Tracks: fixed samples that methods from anywhere are tested on, beside the published rows; docs/adding.md."""

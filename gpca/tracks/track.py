@@ -144,7 +144,7 @@ _TRACKS = (
         "auroc_failed",
         draws="scan cause intervals",
         clusters="scenes",
-        measures="The measures are those of Table XVIII (docs/scans.md), of registrations to which no noise was "
+        measures="The measures are those of Table XVIII (docs/real_world.md), of registrations to which no noise was "
         "added; the last row has counterfactual access.",
         listed="scans.datasets",
         everywhere=("virtual_scans",),

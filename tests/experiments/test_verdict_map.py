@@ -33,7 +33,12 @@ def test_every_mean_has_a_cell_with_its_difference_and_those_that_no_run_decides
 
 def test_factors_and_lower_bounds_have_signs():
     row = {"difference": -2.04, "factor": float("nan"), "at_least": "False", "unit": "%"}
-    shown = [row, row | {"factor": 0.25}, row | {"factor": 31.4, "at_least": "True"}, row | {"difference": float("nan")}]
+    shown = [
+        row,
+        row | {"factor": 0.25},
+        row | {"factor": 31.4, "at_least": "True"},
+        row | {"difference": float("nan")},
+    ]
     assert [verdict_map._words(each) for each in shown] == ["-2.0", "÷4.0", ">×31", ""]
 
 

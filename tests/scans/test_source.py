@@ -228,13 +228,13 @@ def changed(name, change):
 
 
 NPZ_FAULTS = [
-    (without("T_scene_cloud"), "floor.npz: has neither T_scene_cloud nor T_model_cloud; make it as docs/scans.md says"),
+    (without("T_scene_cloud"), "has neither T_scene_cloud nor T_model_cloud; make it as docs/real_world.md says"),
     (without("cloud_1"), "array 'cloud_1' is missing"),
     (lambda arrays: arrays | {"cloud_9": arrays["cloud_1"]}, "array 'cloud_9' has no pose"),
     (changed("index", lambda index: index * 0), "array 'index' names a cloud twice"),
     (changed("index", lambda index: index[1:]), r"array 'index' is 2, not 3|is 3×4×4, not 2×4×4"),
     (changed("cloud_0", lambda points: points[:, :2]), "array 'cloud_0' is 1000×2, not "),
-    (changed("cloud_0", lambda points: points * np.nan), "array 'cloud_0' contains NaN.*; make it as docs/scans.md"),
+    (changed("cloud_0", lambda points: points * np.nan), "array 'cloud_0' contains NaN.*; make it as docs/real"),
     (changed("T_scene_cloud", lambda poses: 2 * poses), "T_scene_cloud of 0: the pose is not a rigid transform"),
     (changed("cloud_0", lambda points: points.astype(object)), "contains pickled objects, which are never loaded"),
 ]

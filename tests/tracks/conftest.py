@@ -64,7 +64,7 @@ def published(shipped, tmp_path, monkeypatch):
 
 @pytest.fixture
 def method(tmp_path, monkeypatch, apart):
-    """The method of docs/outside.md, in a file of its own."""
+    """The method of docs/adding.md, in a file of its own."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "my_method.py").write_text(block("my_method.py", page="docs/outside.md"))
+    (tmp_path / "my_method.py").write_text(block("my_method.py", page="docs/adding.md"))
     return "my_method.py"

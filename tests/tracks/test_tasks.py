@@ -78,7 +78,7 @@ def test_a_registration_that_is_right_keeps_its_pose(folder, registrations, caps
 
 
 def test_a_method_stands_among_the_published_rows_and_so_do_its_predictions(folder, published, run, tmp_path, capsys):
-    (folder / "my_method.py").write_text(block("my_method.py", page="docs/outside.md"))
+    (folder / "my_method.py").write_text(block("my_method.py", page="docs/adding.md"))
     shutil.copytree(run, tmp_path / "cache/gpca-bench")  # samples that were made before
     do(BENCH)
     table = capsys.readouterr().out
