@@ -50,6 +50,7 @@ class FrameCauseSettings:
     # Of the ladder of errors that the true pose is given: turns in degrees, and shifts.
     rungs: tuple[tuple[HalfTurn, Shift], ...] = ((5.0, 0.03), (15.0, 0.08), (30.0, 0.15), (60.0, 0.3))
     points: CloudPoints = 512  # of what was measured, at most, and of the model
+    methods: tuple[str, ...] = ("point_to_plane", "gicp")  # whose failures from the same starts are counted too
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from gpca.alignment.methods.registry import method_entry
 from gpca.attribution.predictions import read_predictions
 from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.causes.judged import CEILING, MEASURES, Judged, ceiling_of, joined, judged_by, measure
@@ -42,6 +43,7 @@ SAMPLES = "test_samples"
 STATE = "state_accuracy"
 TRUTH = "truth"  # in the place of an explainer: how many there are of a kind, ``count_<kind>``
 PSEUDO = "pseudo_truth"  # in the place of a kind of start: those whose true pose was made by ICP
+FAILED_BY = "failed_"  # and a method: columns of the samples
 COUNTED = ("starts", "instances", "scenes", "objects", *LABELS, BORDERLINE, GEOMETRY, "missed")
 FEWEST_FAILURES = 30  # of a kind, below which nothing is concluded from it
 
@@ -132,7 +134,8 @@ def collect(
         raise InputError("causes of frames", "need files of every seed", "give the same number of each kind")
     for causes_file, sample_file, prediction_file in zip(*files, strict=True):
         causes, seed = Causes.load(causes_file), seed_of_file(causes_file)
-        samples = read_csv(sample_file, SAMPLE_COLUMNS, others=ANY)[list(SAMPLE_COLUMNS)]
+        samples = read_csv(sample_file, SAMPLE_COLUMNS, others=ANY)
+        samples = samples[[name for name in samples if name in SAMPLE_COLUMNS or name.startswith(FAILED_BY)]]
         require_same_samples(sample_file, samples, causes.registrations.arrays, "causes", ("sample",))
         for path in (prediction_file, *(each for each in outside if seed_of_file(each) == seed)):
             for explainer, rows in read_predictions(path, labels=("explainer",)).groupby("explainer", sort=False):
@@ -153,7 +156,7 @@ def collect(
             sizes = subset["seed"].nunique(), counts["scenes"], len(subset)
             records += [
                 (TABLE, name, TRUTH, f"count_{each}", ALL, "", "", *sizes, float(counts[each]), np.nan, np.nan)
-                for each in COUNTED
+                for each in (*COUNTED, *failures_by_method(subset, counts))
             ]
         if kind == PSEUDO:
             continue
@@ -182,6 +185,18 @@ def count_ends(samples: Frame, things: Iterable[str], whole: str) -> Counter[str
     counts.update({f"{name}s": samples[name].nunique() for name in things})
     counts.update({whole: len(samples), "missed": int((samples["missed"] == "True").sum())})
     return counts
+
+
+def failures_by_method(samples: Frame, counts: Counter[str]) -> list[str]:
+    """Add the numbers of samples whose own error is too large by each method and by any, and in how many scenes."""
+    failed = samples[[name for name in samples if name.startswith(FAILED_BY)]] == "True"
+    if failed.empty:
+        return []
+    any_N = failed.any(axis=1)
+    counts.update({name: int(failed[name].sum()) for name in failed})
+    more = {"failures": int(failed.to_numpy().sum()), "failed_scenes": samples["scene"][any_N].nunique()}
+    counts.update(more)
+    return [*failed, *more]
 
 
 def counts_in(rows: Frame) -> dict[str, int]:
@@ -282,11 +297,17 @@ def table9_frame_counts(run: Run, intervals):
         sources = [stem.rstrip("/"), *(f"{stem}{name}" for name in datasets)]
         each = zip(labels, sources, strict=True)
         rows += [Row([start, label], {"source": source, "method": TRUTH}) for label, source in each]
+    metrics, prefix = dict.fromkeys(intervals["metric"]), f"count_{FAILED_BY}"
+    methods = [metric.removeprefix(prefix) for metric in metrics if metric.startswith(prefix)]
     titles = {"starts": "Starts", "instances": "Instances", "scenes": "Scenes"} | ENDS
+    titles |= {FAILED_BY + name: f"Off by {method_entry(name).title}" for name in methods if name != "scenes"}
+    titles |= {"failures": "Off, all methods", "failed_scenes": "in scenes"} if methods else {}
     notes = (
         "Every estimator's pose of an instance is a start by itself. By a cause: it adds most to the error, as "
         "Table IX measures it. Without a cause: off even with every cause removed; not among the failed.",
         MISSED_NOTE,
+        "Off by a method: its one registration from that start ends more than the limit of a failure away. Failed is "
+        "the mean over starts around it.",
         "Truth made by ICP: the true poses were found by ICP themselves, so these test no ICP and are counted here "
         "alone.",
     )

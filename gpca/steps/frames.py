@@ -6,6 +6,8 @@ import sys
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from gpca.attribution.predictions import write_timings
 from gpca.causes.dataset import Causes
 from gpca.causes.settings import CauseSettings, FrameCauseSettings
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
     from gpca.frames.instances import Instances
 
 ALL_OBJECTS = "all"
+SHOWN_METHOD = "point_to_point"  # ICP as in the registrations that are shown
 
 
 def scenes(job: Job) -> None:
@@ -153,8 +156,33 @@ def frame_causes(job: Job) -> None:
         causes, samples = measure_frames(instances, starts, objects, meshes, *axes, settings, own.points)
         seen = zip(samples["dataset"], samples["scene"], strict=True)
         causes.save(job.frame_causes)
-        write_csv(job.samples, samples.assign(truth=[datasets[name].place(scene).truth for name, scene in seen]))
+        samples = samples.assign(truth=[datasets[name].place(scene).truth for name, scene in seen])
+        limit = settings.limits.failed
+        failed = {f"failed_{SHOWN_METHOD}": causes.error_shown > limit}
+        failed |= {f"failed_{name}": errors_S > limit for name, errors_S in _errors(causes, objects, axes, own).items()}
+        write_csv(job.samples, samples.assign(**failed))
         starts.subset(causes.registrations.sample).save(job.starts, axes)
+
+
+def _errors(
+    causes: Causes, objects: ObjectClouds, axes: tuple[str, int], settings: FrameCauseSettings
+) -> dict[str, np.ndarray]:
+    """Return the errors (S,) of each other method from the same starts, in diameters; infinite where it fails."""
+    from gpca.alignment.methods.registry import make_method
+    from gpca.pairs.judge import Judges
+    from gpca.process.progress import progress
+    from gpca.steps.registration_trials import pair_to_register
+
+    registrations, judges = causes.registrations, Judges(objects, f"objects of {axes[0]}")
+    made = {name: make_method(name, {}) for name in settings.methods}
+    errors = {name: np.full(len(causes), np.inf) for name in made}
+    for row in progress(range(len(causes)), f"other methods on {axes[0]}, seed {axes[1]}"):
+        pair, judge = pair_to_register(registrations, row, *axes, settings.points), judges.of(registrations, row)
+        for name, method in made.items():
+            if (outcome := method(pair)).converged:
+                T_true = registrations.T_target_source("true", row)
+                errors[name][row] = judge(outcome.T_target_source, T_true)["add_relative"]
+    return errors
 
 
 def reenact_frames(job: Job) -> None:

@@ -69,6 +69,12 @@ def test_every_explainer_is_judged_on_the_frames(asked):
     counts = dict(zip(counts["metric"], counts["value"], strict=True))
     assert sum(counts[f"count_{state}"] for state in (*LABELS, BORDERLINE, GEOMETRY)) == 6
     assert counts["count_starts"] == 6
+    samples = pd.read_csv(asked[1][0])
+    off = samples[[f"failed_{name}" for name in ("point_to_point", "point_to_plane", "gicp")]]
+    assert off["failed_point_to_point"].tolist() == (causes.error_shown > CAUSES["limits"]["failed"]).tolist()
+    assert [counts[f"count_{name}"] for name in off] == off.sum().tolist()
+    assert counts["count_failures"] == off.to_numpy().sum()
+    assert counts["count_failed_scenes"] == samples["scene"][off.any(axis=1)].nunique()
     assert set(rows["method"]) <= {TRUTH, "ceiling", *SETTINGS["explainers"]}
     both = counts["count_nominal"] and any(counts[f"count_{kind}"] for kind in ("noise", "pose", "overlap"))
     assert bool(both) == (STATE in set(rows["metric"]))
