@@ -20,11 +20,6 @@ def linear(x_I: torch.Tensor, weight_O_I: torch.Tensor) -> torch.Tensor:
     return _Linear.apply(x_I.flatten(0, -2), weight_O_I).view(*x_I.shape[:-1], -1)
 
 
-def stacked_product(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
-    """Return ``a @ b`` of stacks of matrices (…, N, I) and (…, I, O), differentiable in both."""
-    return a @ b if a.device.type != "cpu" else _StackedProduct.apply(a, b)
-
-
 class PointLinear(nn.Linear):
     """A linear layer whose product is :func:`linear`."""
 
@@ -69,15 +64,3 @@ class _Linear(torch.autograd.Function):
         wanted_x, wanted_weight = ctx.needs_input_grad
         by_x = _product(grad_N_O, weight_O_I) if wanted_x else None
         return by_x, _product(grad_N_O.T, x_N_I) if wanted_weight else None
-
-
-class _StackedProduct(torch.autograd.Function):
-    @staticmethod
-    def forward(ctx: Any, a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
-        ctx.save_for_backward(a, b)
-        return _product(a, b)
-
-    @staticmethod
-    def backward(ctx: Any, *grads: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        (grad,), (a, b) = grads, ctx.saved_tensors
-        return _product(grad, b.mT), _product(a.mT, grad)

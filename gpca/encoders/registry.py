@@ -13,7 +13,6 @@ from gpca.settings import Bounds, Count, PositiveShare, Share, changes_of, read_
 ENCODERS = {
     "dgcnn": "gpca.encoders.dgcnn:DGCNN",
     "pointnet": "gpca.encoders.pointnet:PointNet",
-    "pointnet_tnet": "gpca.encoders.pointnet:PointNetTNet",
     "pointnet2": "gpca.encoders.pointnet:PointNet2",
     "pointnext": "gpca.encoders.pointnet:PointNeXt",
 }
@@ -63,7 +62,7 @@ class DGCNNOptions:
 
 @dataclass(frozen=True)
 class PointNetOptions:
-    """Options of PointNet with and without T-Nets."""
+    """Options of PointNet."""
 
     width: Count = 64
 
@@ -79,7 +78,6 @@ class PointNet2Options(PointNetOptions):
     centroids: Annotated[int, Bounds(minimum=4)] = 256
     radius: PositiveShare = 0.1
     neighbours: Count = 32
-    as_published: bool = False
 
 
 @dataclass(frozen=True)
@@ -95,7 +93,6 @@ class PointNeXtOptions(PointNetOptions):
 OPTIONS = {
     "dgcnn": DGCNNOptions,
     "pointnet": PointNetOptions,
-    "pointnet_tnet": PointNetOptions,
     "pointnet2": PointNet2Options,
     "pointnext": PointNeXtOptions,
 }

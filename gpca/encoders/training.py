@@ -156,8 +156,6 @@ class _Training:
             self._schedule(epoch * self._batches + batch)
             outputs_B_C, targets_B = self._predict(batch_rows, "epoch", epoch)
             loss = nn.functional.cross_entropy(outputs_B_C, targets_B)
-            if (penalty := getattr(self._model.encoder, "penalty", None)) is not None:
-                loss = loss + penalty
             self._optimizer.zero_grad()
             loss.backward()
             self._optimizer.step()

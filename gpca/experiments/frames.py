@@ -13,8 +13,7 @@ from gpca.reporting.words import dataset_in_words
 TOGETHER = "attribution"  # all test samples, in the column `table`
 CLASSIC = {"analytical_gpc": "Classic features", "analytical_gpc_no_counts": "Classic features without point counts"}
 BACKBONES = {"dgcnn": "DGCNN", "pointnet": "PointNet", "pointnet2": "PointNet++", "pointnext": "PointNeXt-S"}
-BACKBONES |= {"dgcnn_1024": "DGCNN of 1024 features", "pointnet_tnet": "PointNet with T-Nets"}
-BACKBONES |= {"pointnet2_ssg": "PointNet++ as published"}
+BACKBONES |= {"dgcnn_1024": "DGCNN of 1024 features"}
 REDUCTIONS = {"none": "No reduction", "pca": "PCA", "umap": "UMAP", "autoencoder": "Autoencoder"}
 
 

@@ -14,7 +14,6 @@ from gpca.pairs.synthesis import RegistrationSettings, make_registrations
 SMALL = {
     "dgcnn": {"k": 8, "point_features": 64},
     "pointnet": {"width": 8},
-    "pointnet_tnet": {"width": 8},
     "pointnet2": {"width": 8, "centroids": 32},
     "pointnext": {"width": 8},
 }
@@ -62,14 +61,9 @@ def shapes(*layers):
     return [linear.weight.shape for layer in layers for linear in layer.linears]
 
 
-def test_pointnet_has_the_published_widths_with_and_without_tnets():
+def test_pointnet_has_the_published_widths():
     encoder = make_encoder("pointnet", {})
     assert shapes(encoder.layers) == POINTNET and encoder.embedding_size == 1024
-    encoder = make_encoder("pointnet_tnet", {})
-    assert shapes(encoder.first, encoder.last.layers) == POINTNET
-    for turn, inputs in ((encoder.turn_points, 3), (encoder.turn_features, 64)):
-        assert shapes(turn.points.layers, turn.whole) == [(64, inputs), (128, 64), (1024, 128), (512, 1024), (256, 512)]
-        assert turn.matrix.weight.shape == (inputs**2, 256)
 
 
 def test_pointnet2_has_the_published_widths_and_the_points_own_coordinates():
@@ -79,57 +73,6 @@ def test_pointnet2_has_the_published_widths_and_the_points_own_coordinates():
         (1024, 512),
     ]  # fmt: skip
     assert encoder.embedding_size == 1024
-
-
-def test_pointnet2_as_published_sees_relative_coordinates_alone_and_the_published_sizes():
-    encoder = make_encoder("pointnet2", {"centroids": 512, "as_published": True})
-    assert shapes(*encoder.levels, encoder.whole)[::3] == [(64, 3), (128, 3 + 128), (256, 3 + 256)]
-    # 1.48 million with ModelNet40's head of 512, 256 and 40 units, and with biases before the batch norms.
-    head = (1024 * 512 + 2 * 512) + (512 * 256 + 2 * 256) + (256 * 40 + 40)
-    biases = 64 + 64 + 128 + 128 + 128 + 256 + 256 + 512 + 1024 + 512 + 256
-    assert round((parameter_count(encoder) + head + biases) / 1e6, 2) == 1.48
-
-
-def test_pointnet2_as_published_works_in_the_unit_sphere():
-    """A ball's features do not depend on where it is, and radii and coordinates are those of a cloud twice as large."""
-    torch.manual_seed(0)
-    encoder = make_encoder("pointnet2", {"width": 8, "centroids": 32, "as_published": True}).eval()
-    seen = []
-    for level in encoder.levels:
-        level.register_forward_hook(lambda _, inputs, output: seen.append((inputs, output)))
-    for points in (clouds(), clouds() + 0.3):
-        encoder(points)
-    (first, first_out), _, (_, moved_out), _ = seen
-    torch.testing.assert_close(moved_out, first_out, atol=1e-4, rtol=1e-4)
-    assert first[1] is None and torch.equal(first[0], 2 * clouds()) and first[2].radius == 1
-    inside = (first[2].centers_B_M_3[0, 0] - first[0][0, first[2].neighbors_B_M_k[0, 0].long()]).norm(dim=1)
-    assert inside.max() <= 0.2
-
-
-def test_a_tnet_starts_at_the_identity_and_its_second_transform_is_held_near_a_rotation():
-    torch.manual_seed(0)
-    encoder = make_encoder("pointnet_tnet", {"width": 8})
-    assert torch.equal(encoder.turn_points(clouds()), torch.eye(3).expand(4, 3, 3))
-    encoder(clouds())
-    assert encoder.penalty == 0
-    encoder.turn_features.matrix.bias.data[0] = 2.0  # AAᵀ is off by 3 in one place
-    encoder(clouds())
-    assert encoder.penalty.item() == pytest.approx(1e-3 * 9)
-    encoder.penalty.backward()
-    assert encoder.turn_features.matrix.bias.grad[0] == pytest.approx(1e-3 * 2 * 3 * 2 * 2)
-    encoder.eval()(clouds())
-    assert encoder.penalty is None
-
-
-def test_the_training_minimizes_the_penalty_of_a_tnet(easy, monkeypatch):
-    from gpca.encoders import pointnet
-
-    settings = EncoderSettings("pointnet_tnet", draw_points=32, draws=1, epochs=1, batch_size=24, options={"width": 8})
-    losses = []
-    for penalty in (0.0, 1.0):
-        monkeypatch.setattr(pointnet, "_from_orthogonal", lambda A, penalty=penalty: 1e3 * penalty + 0 * A.sum())
-        losses.append(train_encoder(easy, "tiny", 0, settings)[1][0]["loss"])
-    assert losses[1] == pytest.approx(losses[0] + 1, abs=1e-4)
 
 
 def test_pointnext_has_the_published_number_of_parameters():

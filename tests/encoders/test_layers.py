@@ -4,7 +4,7 @@ import pytest
 import torch
 from torch import nn
 
-from gpca.encoders.layers import PointLinear, linear, stacked_product
+from gpca.encoders.layers import PointLinear, linear
 
 
 @pytest.mark.parametrize("shape", [(7, 5), (3, 7, 5), (2, 3, 7, 5)])
@@ -33,9 +33,3 @@ def test_the_layer_is_a_linear_layer(bias):
     plain.load_state_dict(layer.state_dict())
     x = torch.randn(3, 6, 5)
     assert torch.allclose(layer(x), plain(x), atol=1e-6)
-
-
-def test_a_stacked_product_has_the_gradients_of_torchs():
-    a, b = torch.randn(2, 3, 4, 5, dtype=torch.double), torch.randn(2, 3, 5, 6, dtype=torch.double)
-    assert torch.allclose(stacked_product(a, b), a @ b)
-    assert torch.autograd.gradcheck(stacked_product, (a.requires_grad_(), b.requires_grad_()))
