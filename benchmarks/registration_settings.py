@@ -4,9 +4,9 @@
     python benchmarks/registration_settings.py results/development [--pairs 21] [--methods fgr teaser]
 
 The pairs are those of Table XI, of objects that no table shows, so many of each seed, spread over the objects; with
-`--failed 60`, pairs that point-to-point ICP does not register, where the columns of causes overlap. Each candidate is
-compared with `posterior` pair by pair; intervals are over families of objects and seeds. The last line is a JSON
-object: success_<candidate>, in %.
+`--failed 60`, pairs that point-to-point ICP does not register, where the columns of causes overlap. With `--refined`,
+that ICP starts from what each candidate found, as in Table XX. Each candidate is compared with `posterior` pair by
+pair; intervals are over families of objects and seeds. The last line is a JSON object: success_<candidate>, in %.
 """
 
 import argparse
@@ -50,17 +50,22 @@ CANDIDATES: dict[str, list[tuple[dict, dict]]] = {  # method -> (its settings, w
     ],
     "fpfh_ransac": [
         ({}, {}),
+        ({"feature_radius": 0.35}, {}),
+        ({"iterations": 100_000}, {}),
+        (WIDE, {}),
         (WIDE, MANY),
         *((WIDE | {"inlier_distance": limit}, MANY) for limit in (0.03, 0.075)),
         (WIDE | {"feature_radius": 0.35}, MANY),
     ],
     "teaser": [
         ({}, {}),
+        *(({"noise": limit}, {}) for limit in (0.03, 0.075)),
+        (WIDE, {}),
         (WIDE, MANY),
         *((WIDE | {"noise": limit}, MANY) for limit in (0.03, 0.075)),
         (WIDE | {"most_matches": 600}, MANY),
     ],
-    "kiss_matcher": [({"voxel": edge}, {"points": 2048}) for edge in (0.04, 0.05, 0.06, 0.08)],
+    "kiss_matcher": [({"voxel": edge}, {"points": 2048}) for edge in (0.03, 0.04, 0.05, 0.06, 0.08, 0.1, 0.12)],
 }
 
 
@@ -69,6 +74,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("results", type=Path, help="folder of a run on development objects")
     parser.add_argument("--pairs", type=int, default=21, help="of each seed")
     parser.add_argument("--failed", type=int, help="so many pairs that ICP does not register instead")
+    parser.add_argument("--refined", action="store_true", help="by ICP")
     parser.add_argument("--methods", nargs="+", choices=list(CANDIDATES), default=list(CANDIDATES))
     options = parser.parse_args(arguments)
     prepare()
@@ -83,7 +89,7 @@ def main(arguments: list[str] | None = None) -> None:
         if options.failed
         else pairs_of_table(options.results, options.pairs)
     )
-    seeds, families, causes, errors, seconds = registered(given, candidates)
+    seeds, families, causes, errors, seconds = registered(given, candidates, options.refined)
     draws = Clustered.drawn(seeds, families, "registration settings")
     print(
         f"{len(seeds)} pairs, {len(set(families))} families, success: error below {100 * SUCCESS:g} % of the diameter"
@@ -111,7 +117,7 @@ def label(name: str, settings: dict, of_pair: dict) -> str:
     return " ".join([name, *(f"{key}={value}" for key, value in (settings | of_pair).items())])
 
 
-def registered(given: Iterator[Given], candidates: dict[str, tuple[str, dict, dict]]) -> tuple:
+def registered(given: Iterator[Given], candidates: dict[str, tuple[str, dict, dict]], refined: bool) -> tuple:
     """Return seeds and families (N,) and causes (N, 3) of the pairs, and errors (N,) and seconds of each candidate.
 
     The error of a registration that failed is infinite.
@@ -119,6 +125,7 @@ def registered(given: Iterator[Given], candidates: dict[str, tuple[str, dict, di
     from gpca.alignment.methods.registry import make_method
 
     methods = {name: make_method(method, settings) for name, (method, settings, _) in candidates.items()}
+    refine = make_method("point_to_point")
     errors: dict[str, list[float]] = {name: [] for name in candidates}
     seconds: dict[str, list[float]] = {name: [] for name in candidates}
     known = []
@@ -130,7 +137,10 @@ def registered(given: Iterator[Given], candidates: dict[str, tuple[str, dict, di
             started = process_time()  # other processes do not count
             outcome = methods[name](pair)
             seconds[name].append(process_time() - started)
-            errors[name].append(error_of(outcome.T_target_source) if outcome.converged else np.inf)
+            T = outcome.T_target_source
+            if refined and outcome.converged:
+                T = refine(pair.started_at(T)).T_target_source
+            errors[name].append(error_of(T) if outcome.converged else np.inf)
         known.append(about)
     seeds, families, causes = (np.array(each) for each in zip(*known, strict=True))
     return seeds, families, causes, {name: np.array(each) for name, each in errors.items()}, seconds

@@ -37,7 +37,7 @@ SHOWN_REACH = 5.0  # voxels, up to which distances are colored
 # The default limit of an error: at least that of rooms and of what voxels resolve, at most a share of the extent.
 LIMIT_M, LIMIT_VOXELS, LIMIT_SHARE = 0.2, 2.0, 0.05
 # Of the log odds of a failure, by `benchmarks/scan_judgment.py`: of what is elsewhere, of log(apart), and the constant.
-OF_ELSEWHERE, OF_LOG_APART, LOG_ODDS = 5.4, 4.2, -2.0
+OF_ELSEWHERE, OF_LOG_APART, LOG_ODDS = 8.0, 3.5, -2.3
 GOOD, BAD = 0.2, 0.5  # probability of a failure below which the state is nominal, and from which it is failed
 LEAST_OVERLAP = 0.2  # share of the source below which a wrong pose fits as well as the right one
 VOLUME = "the points of a scan fill a volume, as noise does, instead of lying on surfaces: any pose fits"

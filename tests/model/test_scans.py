@@ -194,11 +194,27 @@ def test_an_estimator_that_fails_is_a_note(scans):
     assert any(note.startswith("censi gives no covariance") for note in said.notes)
 
 
-def test_overlap_is_named_where_the_common_parts_alone_would_have_been_registered(scans):
-    said = explain_scans(transform(inverse(TRUE), room(0, 0.0, 0.6)), room(1, 0.4, 1.0), TRUE)
-    assert said.state != "nominal"
+def apart(share, seed=0):
+    """Two scans, each of such a share of the room, from opposite ends."""
+    return transform(inverse(TRUE), room(seed, 0.0, share)), room(seed + 1, 1 - share, 1.0)
+
+
+def test_overlap_is_named_where_the_common_parts_alone_would_have_been_registered():
+    source, target = apart(0.65)
+    said = explain_scans(source, target, exp(np.array([[0, 0, -0.4, 0, 1.0, 0]]))[0] @ TRUE)
+    assert error_of(said.T_target_source, source) > said.limit
+    assert said.state == "failed"
+    assert error_of(said.fitting_pose, source) < said.limit
     assert "overlap" in said.causes
-    assert "overlap" in next(line for line in said.text().splitlines() if line.startswith("causes"))
+    assert f"causes    {' and '.join(said.causes)}" in said.text()
+
+
+def test_a_right_result_does_not_fail_because_the_scans_would_overlap_more_at_another_pose():
+    source, target = apart(0.6, seed=10)
+    said = explain_scans(source, target, TRUE)
+    assert said.overlap[0] < 0.35
+    assert error_of(said.T_target_source, source) < said.limit / 2
+    assert said.state == "nominal"
 
 
 def test_a_source_far_from_the_target_has_failed(scans):
