@@ -390,6 +390,23 @@ def test_convergence_trains_and_judges_an_encoder(tmp_path, registrations, monke
     assert float(row["loss"]) > 0
 
 
+def test_two_devices_are_compared_by_time_and_agreement(tmp_path, registrations, capsys):
+    """On one device twice, all numbers are the same; without CUDA there is nothing to compare."""
+    import torch
+
+    from benchmarks import devices
+
+    registrations.save(tmp_path / "seed100.npz", ("ycb", 100))
+    command = [str(tmp_path / "seed100.npz"), "--backbones", "pointnet", "--epochs", "1"]
+    assert devices.main([*command, "--devices", "cpu", "cpu"]) == 0
+    found = last_line(capsys.readouterr().out)
+    assert [found[f"{name}_pointnet"] for name in ("first_loss", "accuracy", "max_abs_error")] == [0, 0, 0]
+    assert min(found[f"{name}_speedup_pointnet"] for name in ("train", "embed")) > 0
+    if not torch.cuda.is_available():
+        assert devices.main(command) == 2
+        assert "no CUDA device" in capsys.readouterr().err
+
+
 def test_limits_of_labels_are_tested_on_the_other_registrations(monkeypatch, capsys):
     from benchmarks import calibration
     from gpca.model.explainer import Explainer
