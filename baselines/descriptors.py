@@ -13,6 +13,7 @@ trees replace its network. ``reenact`` and ``reenact_committee`` read a re-enact
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -21,6 +22,7 @@ from baselines.gates import Alarm
 from gpca.causes.dataset import LABELS
 from gpca.causes.descriptors import EVERY, EVERYTHING, RESIDUALS, Columns, seen
 from gpca.causes.settings import DENSITIES
+from gpca.causes.training import QUICK
 from gpca.causes.truth import NOMINAL
 from gpca.classifier.settings import GPCArguments, GPCSettings, LearningRate
 from gpca.explainers import interface
@@ -39,6 +41,7 @@ WITH_RUNS: Sees = ("pair", "motion", "runs")
 ALL: Sees = (*WITH_RUNS, "remedies")
 REENACTMENT: Sees = (*WITH_RUNS, "reenactment")
 WITHOUT = "clouds alone"  # in titles: no motion of ICP, no further runs, no remedies
+LEAST = 1e-9  # of a score, so that their sum is not 0
 JOINT_AND_APART = [row for row, name in enumerate(ENTROPY) if name.startswith(("joint", "apart"))]
 
 
@@ -94,13 +97,21 @@ class CausePairGPCA(DescriptorGPCA):
 
     labels = LABELS
 
+    wanted = EVERYTHING
+
     def __init__(self, sees: Sees, source: str, seed: int, **settings: GPCArguments) -> None:
         axes = (source, seed, "reenactment" if "reenactment" in sees else "causes")
         super().__init__(axes, source, seed, **settings)
         self._sees = sees
 
     def features(self, registrations: Registrations) -> np.ndarray:
-        return described(registrations, self._sees)
+        return described(registrations, self._sees, self.wanted)
+
+
+class QuickGPCA(CausePairGPCA):
+    """The same on quick descriptors alone, which further samples have."""
+
+    wanted = dict.fromkeys(QUICK, EVERY)
 
 
 class MultiLabelGPCA(interface.ScoringExplainer):
@@ -129,12 +140,13 @@ class Committee(interface.ScoringExplainer):
     """The mean of three explainers of different kinds, whose errors differ."""
 
     labels = LABELS
+    gpca: type[CausePairGPCA] = CausePairGPCA
 
     def __init__(self, sees: Sees, source: str, seed: int) -> None:
         self._members: list[interface.ConceptExplainer] = [
-            DescriptorClassifier(randomized_trees(source, seed), sees),
-            DescriptorClassifier(boosted_trees(source, seed), sees),
-            CausePairGPCA(sees, source, seed, learning_rate=0.1, iterations=200),
+            DescriptorClassifier(randomized_trees(source, seed), sees, self.gpca.wanted),
+            DescriptorClassifier(boosted_trees(source, seed), sees, self.gpca.wanted),
+            self.gpca(sees, source, seed, learning_rate=0.1, iterations=200),
         ]
 
     def fit(self, registrations: Registrations) -> None:
@@ -145,6 +157,12 @@ class Committee(interface.ScoringExplainer):
         return np.mean([member.explain(registrations).scores_N_C for member in self._members], axis=0)
 
 
+class QuickCommittee(Committee):
+    """The same on quick descriptors alone."""
+
+    gpca = QuickGPCA
+
+
 class Reenact(interface.ScoringExplainer):
     """Scores are the probabilities of the re-enactment itself (:mod:`gpca.reenactment.dataset`)."""
 
@@ -152,6 +170,20 @@ class Reenact(interface.ScoringExplainer):
 
     def scores(self, registrations: Registrations) -> np.ndarray:
         return attached(registrations, "verdict")
+
+
+class OfFailed(interface.ScoringExplainer):
+    """An explainer of causes that is asked about failures alone: its scores of the concepts."""
+
+    def __init__(self, make: Callable[..., interface.ConceptExplainer], source: str, seed: int) -> None:
+        self._explainer = make(source, seed)
+
+    def fit(self, registrations: Registrations) -> None:
+        self._explainer.fit(registrations)
+
+    def scores(self, registrations: Registrations) -> np.ndarray:
+        scores_N_3 = self._explainer.explain(registrations).scores_N_C[:, 1:] + LEAST
+        return scores_N_3 / scores_N_3.sum(axis=1, keepdims=True)
 
 
 class AlignmentClassifier(Alarm):
@@ -223,7 +255,19 @@ _residuals = partial(regression, RESIDUALS)
 # Spacings and numbers of points: the shortcut that a fixed draw of points opens.
 _density = partial(regression, {"planes": DENSITIES})
 _distances = partial(forest, {"distances": EVERY, "motion": EVERY})
+
+
+def _further(title: str, make: Callable[..., interface.ConceptExplainer]) -> ExplainerEntry:
+    return replace(entry(title, make, WITH_RUNS), further=True)
+
+
 _reenacted = partial(ExplainerEntry, sees=REENACTMENT, reads=interface.REENACTED)
+EXPLAINERS = {  # of the hard samples, all of which failed
+    "reenact": _reenacted("Re-enactment (untrained)", partial(OfFailed, Reenact)),
+    "reenact_committee": _reenacted(
+        "Committee on the re-enactment", partial(OfFailed, partial(Committee, REENACTMENT))
+    ),
+}
 CAUSE_EXPLAINERS = {
     "alarm_entropies": entry("Aligned or not by entropies, CorAl", alarm_entropies, CLOUDS),
     "alarm_features": entry("Aligned or not by local features, after FACT", alarm_features, CLOUDS),
@@ -239,6 +283,8 @@ CAUSE_EXPLAINERS = {
     "gpca_pair_clouds": entry(f"GP-CA on the pair, {WITHOUT}", CausePairGPCA, CLOUDS),
     "gpca_multilabel": entry("GP-CA on the pair, multi-label", MultiLabelGPCA, ALL),
     "gpca_multilabel_clouds": entry(f"GP-CA on the pair, multi-label, {WITHOUT}", MultiLabelGPCA, CLOUDS),
+    "gpca_further": _further("GP-CA on the pair, further samples", QuickGPCA),
+    "committee_further": _further("Committee on the pair, further samples", QuickCommittee),
     "pair_committee": entry("Committee on the pair", Committee, ALL),
     "pair_committee_clouds": entry(f"Committee on the pair, {WITHOUT}", Committee, CLOUDS),
     "reenact": _reenacted("Re-enactment (untrained)", Reenact),

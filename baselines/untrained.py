@@ -5,11 +5,14 @@ from the truth, and only overlap samples have fewer points. Its accuracy is what
 """
 
 import math
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from baselines.gates import GATES, NominalThreshold, motion_alarm
 from gpca.causes.dataset import LABELS
+from gpca.causes.truth import NOMINAL
 from gpca.explainers.interface import ExplainerEntry, ScoringExplainer, for_causes
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS, HalfTurn
@@ -42,7 +45,17 @@ class MostFrequent(ScoringExplainer):
         return np.tile(self._shares_C, (len(registrations), 1))
 
 
-class ThresholdRule(ScoringExplainer):
+class Rule(ScoringExplainer):
+    """Base of rules: turned, pose; else too little of it, overlap; else noise."""
+
+    @staticmethod
+    def named(turned_N: np.ndarray, missing_N: np.ndarray) -> np.ndarray:
+        """Return the scores (N, 3), 1 of the concept that is named."""
+        name_N = np.select([turned_N, missing_N], ["pose", "overlap"], "noise")
+        return (name_N[:, None] == np.array(CONCEPTS)).astype(float)
+
+
+class ThresholdRule(Rule):
     """ICP turned the observed cloud by more than `turned_deg`: pose; it has too few points: overlap; else noise.
 
     A cloud without missing parts has at least the share `complete` of the model's points.
@@ -57,25 +70,28 @@ class ThresholdRule(ScoringExplainer):
         R_icp_N_3_3 = registrations.T_target_source_icp[:, :3, :3]
         cosine_N = ((R_init_N_3_3 * R_icp_N_3_3).sum(axis=(1, 2)) - 1) / 2
         points_N = np.diff(registrations.offsets) / np.diff(registrations.target_offsets)
-        name_N = np.select([cosine_N < self._cosine, points_N < self._complete], ["pose", "overlap"], "noise")
-        return (name_N[:, None] == np.array(CONCEPTS)).astype(float)
+        return self.named(cosine_N < self._cosine, points_N < self._complete)
 
 
-class CauseRule(ThresholdRule):
-    """The rule, with "nominal" by the one of three gates (:mod:`baselines.gates`) that is best in training."""
+class GatedRule(ScoringExplainer):
+    """A rule, with "nominal" by the one of three gates (:mod:`baselines.gates`) that is best in training."""
 
     labels = LABELS
 
+    def __init__(self, rule: Callable[[str, int], Rule], source: str, seed: int) -> None:
+        self._rule = rule(source, seed)
+
     def fit(self, registrations: Registrations) -> None:
-        """Choose the gate and its threshold."""
+        """Choose the gate and its threshold; the rule learns from the failed."""
         label_N = registrations.concept
+        self._rule.fit(registrations.subset(np.flatnonzero(label_N != NOMINAL)))
         fitted = {name: NominalThreshold().fit(motion_alarm(registrations, name), label_N) for name in GATES}
         self._gate = max(fitted, key=lambda name: fitted[name].accuracy)
         self._threshold = fitted[self._gate]
 
     def scores(self, registrations: Registrations) -> np.ndarray:
         """Return the score of nominal by the gate; the concept that the rule names has the rest."""
-        return self._threshold.scores(motion_alarm(registrations, self._gate), super().scores(registrations))
+        return self._threshold.scores(motion_alarm(registrations, self._gate), self._rule.scores(registrations))
 
 
 EXPLAINERS = {
@@ -87,6 +103,9 @@ CAUSE_EXPLAINERS = {
     "chance": ExplainerEntry("Chance", for_causes(Chance), ()),
     "most_frequent": ExplainerEntry("Most frequent label", for_causes(MostFrequent), ()),
     "rule": ExplainerEntry(
-        "Rule, nominal by the best gate", CauseRule, ("pair", "motion", "runs"), reads="descriptors"
+        "Rule, nominal by the best gate",
+        partial(GatedRule, ThresholdRule),
+        ("pair", "motion", "runs"),
+        reads="descriptors",
     ),
 }

@@ -25,7 +25,7 @@ def random_judged(n=60, seed=0, skill=1.0):
     scores = np.round(scores / scores.sum(axis=1, keepdims=True), 2)  # some of them equal
     return Judged(
         label=label,
-        instance=random.choice(["cup", "can", "drill"], size=n),
+        instance=random.choice(["cup", "can", "drill", "box", "bowl", "lamp"], size=n),
         seed=random.choice([100, 101], size=n),
         error=error,
         phi=phi,

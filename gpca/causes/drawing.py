@@ -10,6 +10,7 @@ import numpy as np
 
 from gpca.causes.candidate import Registrar, Unmeasurable, draw_applied, draw_candidate
 from gpca.causes.dataset import Causes
+from gpca.causes.matching import Matching, numbers_of
 from gpca.causes.measuring import Measuring, Subject, as_causes, measure_clean_pairs, read_subjects, split_by_object
 from gpca.causes.settings import CauseSettings, Shares
 from gpca.causes.truth import ALL, BORDERLINE, FAILED, GEOMETRY, NOMINAL, NONE, Truth
@@ -22,6 +23,7 @@ from gpca.process.progress import progress
 from gpca.seeds import generator
 
 Group = tuple[str, bool]  # state or, of the failed, the dominant cause; whether there are several causes
+GIVEN_AWAY = " given away"  # after the cause of a candidate that was refused for its trivial numbers
 COLUMNS = ("split", "object", "group", "several", "kept", "refused")
 UNSEEN: Group = ("any", False)  # of a candidate that was not registered
 REMEDIES = {
@@ -162,12 +164,12 @@ def draw_geometry(
 def draw_further(
     objects: ObjectClouds, source: str, seed: int, settings: CauseSettings, chunk: int, wanted: int
 ) -> Causes:
-    """Draw training samples of the same objects and states as those of :func:`draw_causes`, but borderline.
+    """Draw training samples of all objects, in the states of :func:`draw_causes` but borderline.
 
     The chunk names the draws: two have no candidate in common, and neither depends on the other.
     """
     further = replace(_labeled_alone(settings), train=wanted)
-    drawing = _Drawing(objects, source, seed, settings, further, ("further", chunk))
+    drawing = _Drawing(objects, source, seed, settings, further, ("further", chunk), every=True)
     return as_causes(drawing.of_split("train"), (source, seed))[0]
 
 
@@ -191,7 +193,10 @@ def _labeled_alone(settings: CauseSettings) -> CauseSettings:
 
 
 class _Drawing:
-    """Draws by settings of its own, of objects that those of :func:`draw_causes` divide; `part` names the draws too."""
+    """Draws by settings of its own; `part` names the draws too.
+
+    Of each split it shows the objects of :func:`draw_causes`, or every object.
+    """
 
     def __init__(
         self,
@@ -201,9 +206,12 @@ class _Drawing:
         settings: CauseSettings,
         drawn_by: CauseSettings | None = None,
         part: tuple = (),
+        every: bool = False,
     ) -> None:
         subjects, uncertainty_limit = measure_clean_pairs(read_subjects(objects), source, seed, settings)
-        self._subjects = split_by_object(subjects, source, seed, settings)
+        self._subjects = dict.fromkeys(SPLITS, subjects)
+        if not every:
+            self._subjects = split_by_object(subjects, source, seed, settings)
         self._settings = drawn_by or settings
         self._measuring = Measuring(self._settings, uncertainty_limit)
         self._axes, self._part = (source, seed), part
@@ -251,7 +259,12 @@ class _Drawing:
             group = group_of(truth)
             if not quotas.wants(group):
                 return None, group
-            record = {**measuring.observed(registrar, subject, axes), "truth": truth}
+            observed = measuring.observed(registrar, subject, axes)
+            if settings.matched and group[0] in CONCEPTS:
+                acceptance = Matching.load().acceptance(numbers_of(observed), group[0])
+                if generator(*axes, "matched").random() >= acceptance:
+                    return None, (f"{group[0]}{GIVEN_AWAY}", group[1])
+            record = {**observed, "truth": truth}
             if split == "test":
                 record["again"] = measuring.truth(measuring.counterfactuals(registrar, subject, axes, "other starts"))
         except Unmeasurable as fault:

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from gpca.attribution.predictions import read_predictions
+from gpca.attribution.weighted import augrc
 from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.causes.truth import ALL, BORDERLINE, FAILED, NOMINAL, Truth
 from gpca.errors import InputError
@@ -170,6 +171,8 @@ MEASURES: Mapping[str, Measure] = {
     # As dominant_accuracy, but any cause counts whose φ is that of the dominant one up to the limit of a cause.
     "tied_accuracy": Measure(counted=_failed),
     "named_right": Measure(counted=_labeled),  # whose label is named, causes counted as in tied_accuracy
+    # Area under the curve of generalized risk over coverage, of named_right by the largest score (Traub et al. 2024).
+    "augrc": Measure(counted=_labeled, limits=ANYTHING, least_is_best=True),
     "balanced_accuracy": Measure(counted=_labeled),  # mean over nominal and causes of the share that is named rightly
     "dominant_accuracy": Measure(counted=_failed),  # whose dominant cause has the largest score among the causes
     "auroc_failed": Measure(counted=_labeled),  # how well the alarm tells failed from nominal
@@ -243,12 +246,14 @@ def counted(samples: Judged, metric: str) -> np.ndarray:
 
 
 def decision_measures(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
-    """Return regret and named_right, which judge what is named alone, whatever the other scores are."""
+    """Return regret and named_right, which judge what is named alone, and augrc, which judges how sure that is too."""
     labeled_N, failed_N = _labeled(samples), _failed(samples)
     gain_N_3, named_N_3 = gains(samples), samples.named[:, None] == np.array(CONCEPTS)
     regret_N = np.maximum(gain_N_3.max(axis=1), 0) - np.where(named_N_3, gain_N_3, 0).sum(axis=1)
     right_N = np.where(failed_N, (named_N_3 & samples.tied).any(axis=1), samples.named == samples.label)
+    confidence_N = np.maximum(samples.nominal, samples.scores.max(axis=1))
     return {
+        "augrc": augrc(confidence_N[labeled_N], ~right_N[labeled_N], weights_B_N[:, labeled_N]),
         "regret": weighted_mean(regret_N[failed_N], weights_B_N[:, failed_N]),
         "named_right": weighted_mean(right_N[labeled_N], weights_B_N[:, labeled_N]),
     }

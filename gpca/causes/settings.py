@@ -13,7 +13,7 @@ import numpy as np
 from gpca.causes.truth import SUBSETS
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS, HalfTurn, Hidden, Severities, Shift
-from gpca.settings import Bounds, Count, OpenShare, Positive, Share, read_settings
+from gpca.settings import Bounds, Count, OpenShare, Positive, PositiveShare, Share, read_settings
 from gpca.uncertainty.settings import FEWEST_STARTS, UncertaintySettings, start_deviation
 
 GROUPS = ("distances", "planes", "motion", "starts", "remedied", "entropy")
@@ -131,7 +131,8 @@ class CauseSettings(UncertaintySettings):
     test: Annotated[int, Bounds(minimum=6)] = 300
     test_objects: OpenShare = 0.3  # that only test samples show, at least one
     points: tuple[CloudPoints, CloudPoints] = (128, 1024)  # of the model, and of what is left of the observed cloud
-    present: OpenShare = 0.5  # probability of each cause
+    present: PositiveShare = 0.5  # probability of each cause
+    matched: bool = False  # candidates whose trivial numbers give their dominant cause away are refused as often
     partial: Share = 0.0  # of those without overlap, have a model that lacks surface
     lacking: tuple[Hidden, Hidden] = (0.10, 0.50)  # share beyond a plane that it lacks; half lack what one side hides
     form: Form = field(default_factory=Form)

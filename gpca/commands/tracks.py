@@ -102,12 +102,17 @@ def _method_names(method: str, track: Track) -> list[str]:
 def add_score_arguments(parser: ArgumentParser) -> None:
     add = parser.add_argument
     add("track", help=f"one of {', '.join(TRACKS)}")
-    add("predictions", type=Path, help="CSV with a head of comments (docs/adding.md)")
+    add("predictions", type=Path, nargs="?", help="CSV with a head of comments (default: the published rows alone)")
+    add("--published", type=Path, help="folder of the published rows (default: those of the leaderboard)")
 
 
 def run_score(options: Namespace) -> int:
-    """Check and score predictions; faults are lines on stderr, with status 2."""
-    published = Published.load(track_of(options.track))
+    """Check and score predictions, or recompute the published rows; faults are lines on stderr, with status 2."""
+    track = track_of(options.track)
+    published = Published.load(track, options.published and options.published / f"{track.name}.npz")
+    if options.predictions is None:
+        print(leaderboard.as_text_among(published, {}))
+        return 0
     submission, faults = read_submission(options.predictions, published)
     if submission is None:
         print(*faults, sep="\n", file=sys.stderr)
@@ -147,6 +152,7 @@ def add_ship_predictions_arguments(parser: ArgumentParser) -> None:
     add = parser.add_argument
     folder = Path("results") / DEFAULT
     add("--run", dest="folder", type=Path, default=folder, help=f"folder of the run (default: {folder})")
+    add("--config", help="name of the run's config (default: that of the track)")
     add("--out", type=Path, default=FOLDER, help="folder to write them to")
     default_tracks = [name for name, track in TRACKS.items() if track.run == DEFAULT]
     words = "; ".join(f"{name} needs the run {track.run}" for name, track in TRACKS.items() if track.run != DEFAULT)
@@ -166,7 +172,8 @@ def run_ship_predictions(options: Namespace) -> None:
     paths = {name: options.out / f"{track_of(name).name}.npz" for name in options.tracks}
     require_outputs(paths.values(), [options.folder])
     for name, path in paths.items():
-        published = collect(track_of(name), options.folder, track_of(name).config())
+        track = replace(track_of(name), run=options.config or track_of(name).run)
+        published = collect(track, options.folder, track.config())
         published.save(path)
         total += path.stat().st_size
         print(f"{path}: {len(published.methods)} methods, {len(published.rows)} samples, version {published.version}")

@@ -4,7 +4,8 @@ The pigeonhole bootstrap (Owen 2007) draws clusters (families of objects, scenes
 replacement and weights a sample by the product of the two counts. A share has the farther bounds of it and of Wilson's
 interval for independent samples, because few clusters may agree by chance; an instance that counts once in the share,
 whatever its number of starts, is one of them. Where all draws agree, Wilson's interval counts a cluster once in each
-seed. docs/comparison.md states this rule, benchmarks/intervals.py checks its coverage.
+seed. Differences are :func:`corrected`. docs/comparison.md states this rule, benchmarks/intervals.py checks its
+coverage.
 """
 
 from __future__ import annotations
@@ -22,9 +23,19 @@ from gpca.seeds import generator
 
 REPEATS = 500
 LEVEL = 0.95
+FEWEST_CLUSTERS = 5  # below which no difference is shown
 NO_WIDTH = 1e-9  # an interval this narrow differs from a point by rounding alone
 ANYTHING = (-np.inf, np.inf)  # limits of a value that has none
-UNTRAINED = ("chance", "most_frequent", "rule")  # explainers of baselines/untrained.py
+TRIVIAL = (
+    "chance",
+    "most_frequent",
+    "rule",
+    "rule_fitted",
+    "tree_trivial",
+    "logistic_trivial",
+    "density",
+    "hypotheses",
+)
 
 
 def mean_ranks(values_N: np.ndarray) -> np.ndarray:
@@ -88,6 +99,35 @@ def interval(
         least, most = wilson_interval(min(max(value, 0.0), 1.0) * samples, samples, level)
         low, high = min(low, least), max(high, most)
     return Estimate(value, low, high)
+
+
+def corrected(
+    value_M: np.ndarray, low_M: np.ndarray, high_M: np.ndarray, clusters_M: np.ndarray, picked: bool = True
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the bounds of M differences, widened for few clusters and for the best being picked from all of them.
+
+    The distance of each bound grows from the normal quantile to Student's with a degree of freedom less than there are
+    clusters, at levels by Holm (1979) if the differences are picked from: the largest relative to its width at
+    1 - 0.05 / M, the next at 1 - 0.05 / (M - 1), and so on to the first that is not shown, whose level the others
+    share. With fewer than `FEWEST_CLUSTERS`, all bounds reach 0. A difference without an interval keeps none.
+    """
+    from scipy.special import stdtrit
+
+    low_M, high_M = np.array(low_M, float), np.array(high_M, float)
+    usual = NormalDist().inv_cdf((1 + LEVEL) / 2)
+    measured = np.flatnonzero(np.isfinite(high_M - low_M))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        sizes = np.nan_to_num(np.abs(value_M[measured]) / (high_M - low_M)[measured], posinf=np.inf)
+    left, shown = len(measured) if picked else 1, True
+    for row in measured[np.argsort(-sizes, kind="stable")]:
+        factor = stdtrit(max(clusters_M[row], FEWEST_CLUSTERS) - 1, 1 - (1 - LEVEL) / 2 / max(left, 1)) / usual
+        low_M[row] = value_M[row] - factor * (value_M[row] - low_M[row])
+        high_M[row] = value_M[row] + factor * (high_M[row] - value_M[row])
+        shown = shown and not low_M[row] <= 0 <= high_M[row]
+        left -= shown and picked
+        if clusters_M[row] < FEWEST_CLUSTERS:
+            low_M[row], high_M[row] = min(low_M[row], 0.0), max(high_M[row], 0.0)
+    return low_M, high_M
 
 
 def quantile_bounds(values_B: np.ndarray, level: float = LEVEL) -> tuple[float, float]:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.evaluation.intervals import ANYTHING, Clustered, best_of, interval, weighted_mean
+from gpca.evaluation.intervals import ANYTHING, Clustered, best_of, corrected, interval, weighted_mean
 from gpca.io.csv_file import read_numbers, write_csv
 from gpca.seeds import seed_of_file
 
@@ -28,6 +28,7 @@ GROUPS = ("table", "source", "method")
 KEYS = (*GROUPS, "metric", "concept")
 TIDY_COLUMNS = (*KEYS, "seed", "value")
 AGAINST = ("against", "other")
+PICKED = ("rival", "trivial", "trained")  # kinds of differences, from the best of several
 NUMBERS = ("seeds", "clusters", "samples", "value", "low", "high")
 COLUMNS = (*KEYS, *NUMBERS)
 TEST_SAMPLES = "test_samples"
@@ -149,9 +150,20 @@ def compared(
 
 
 def intervals(records: list[tuple], name: str) -> pd.DataFrame:
-    """Frame of `COLUMNS`, or of `KEYS`, `AGAINST` and `NUMBERS`; `name` says what the records are of."""
+    """Frame of `COLUMNS`, or of `KEYS`, `AGAINST` and `NUMBERS`; `name` says what the records are of.
+
+    Differences have :func:`corrected <gpca.evaluation.intervals.corrected>` bounds: those from the best of several
+    methods, a kind in `PICKED`, for all methods that have one.
+    """
     with_rivals = bool(records) and len(records[0]) > len(COLUMNS)
-    return tidy(records, name, (*KEYS, *AGAINST, *NUMBERS) if with_rivals else COLUMNS, "run its step first")
+    rows = tidy(records, name, (*KEYS, *AGAINST, *NUMBERS) if with_rivals else COLUMNS, "run its step first")
+    if with_rivals:
+        keys = [*(key for key in KEYS if key != "method"), AGAINST[0]]
+        for (*_, kind), of in rows[rows[AGAINST[0]] != ""].groupby(keys, sort=False):
+            value_M, low_M, high_M, clusters_M = (of[name].to_numpy() for name in ("value", "low", "high", "clusters"))
+            bounds = corrected(value_M, low_M, high_M, clusters_M, kind in PICKED)
+            rows.loc[of.index, ["low", "high"]] = np.column_stack(bounds)
+    return rows
 
 
 def read_clustered(path: str | Path) -> pd.DataFrame:

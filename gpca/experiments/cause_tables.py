@@ -35,7 +35,7 @@ SHOWN = {
     "regret": show("regret", "Regret (%)", limits=(0.0, inf), least_is_best=True),
     "tied_accuracy": show("tied_accuracy", "With ties (%)"),
     "balanced_accuracy": show("balanced_accuracy", "Balanced (%)"),
-    "gain": show("balanced_accuracy", "Over untrained (points)", where={"against": "untrained"}, **POINTS),
+    "gain": show("balanced_accuracy", "Over trivial (points)", where={"against": "trivial"}, **POINTS),
     "lead": show("balanced_accuracy", "Lead (points)", where={"against": "rival"}, **POINTS),
     "dominant_accuracy": show("dominant_accuracy", "Dominant (%), chance 33.3"),
     "false_alarm_rate": show("false_alarm_rate", "False alarms (%)", least_is_best=True),
@@ -155,9 +155,10 @@ def table9_causes(run: Run, intervals):
         "Regret: of the failed, the share of the error that removing the best single cause would take away and "
         "removing the named one does not; who names nominal removes nothing. With ties: as Dominant, but any cause "
         "counts whose φ is within the limit of a cause (1 % of the diameter by default) of the largest.",
-        "Balanced: mean share named rightly of nominal and of the three dominant causes. Over untrained: balanced "
-        "accuracy minus that of the best of chance, the most frequent label and the rule; lead: minus that of the "
-        "best other explainer; both on the same draws, so that it is better where the interval is above 0. "
+        "Balanced: mean share named rightly of nominal and of the three dominant causes. Over trivial: balanced "
+        "accuracy minus that of the best trivial row (chance to density, and hypotheses with thresholds); "
+        "lead: minus that of the best other explainer; both on the same draws, so that it is better "
+        "where the interval is above 0. "
         "Dominant: of the failed alone, the share whose main cause has the highest score among the causes. No gate "
         "of nominal helps with that, and guessing is right in 33.3 %."
         + rule_near_chance(intervals, run.sources, metric="dominant_accuracy", against=""),

@@ -11,7 +11,7 @@ from gpca.errors import InputError
 from gpca.evaluation.intervals import REPEATS
 from gpca.evaluation.measures import ALL, POOLED, source_method_seed, tidy
 from gpca.experiments.cause_tables import rule_near_chance
-from gpca.experiments.controls import AUROC, CALLS, NO_TRAINING, RIVAL, SECTION, USUAL
+from gpca.experiments.controls import AUROC, CALLS, OF_TRIVIAL, RIVAL, SECTION, USUAL
 from gpca.experiments.explained import titles
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.registry import explainer_entry
@@ -38,7 +38,7 @@ TITLES = {
     "shuffled": "Shuffled labels",
 }
 CHANGE = "_change"  # suffix of a control: the column of differences from the paper's protocol
-DIFFERENCES = {"_gain": (NO_TRAINING, "over untrained (points)"), "_lead": (RIVAL, "lead (points)")}
+DIFFERENCES = {"_gain": (OF_TRIVIAL, "over trivial (points)"), "_lead": (RIVAL, "lead (points)")}
 WRONG = "_wrong"  # suffix of an AUROC: the column of the answers that it has to detect
 AUROCS = {PAPER: "AUROC, paper's", UNSEEN: "AUROC, unseen"}
 BOOTSTRAP = f"the 95 % interval of a bootstrap over objects and seeds ({REPEATS} draws)"
@@ -114,10 +114,10 @@ def table10_controls(run: Run, intervals):
         "and explainer learned from other objects. Other sources: they learned from one other source. Wrong "
         "labels: among the explainer's training samples. Shuffled labels teach nothing: guessing gives "
         "33.3, although in a single source and seed whole clusters of samples may be named by chance.",
-        "Over untrained: accuracy minus that of the best of chance, the most frequent label and the rule under the "
-        "same control; lead: minus that of the best other explainer; both on the same draws, so that it is better "
-        "where the interval is above 0. Reads: what an explainer sees of a registration. ICP calls: runs beyond "
-        "the one that it explains.",
+        "Over trivial: accuracy minus that of the best trivial row (chance to density, and hypotheses with thresholds) "
+        "under the same control; lead: minus that of the best other explainer; both on the same draws, so that it is "
+        "better where the interval is above 0. Reads: what an explainer sees of a registration. ICP calls: runs "
+        "beyond the one that it explains.",
         "Hard: samples of unseen objects with one to three perturbations, labeled with the one that adds most to "
         "the error by counterfactuals. No start is right, no sensor free of noise, no surface whole, and the "
         "number of points tells nothing. Guessing is right in 33.3 %."

@@ -13,11 +13,11 @@ from gpca.declarations.plan import Run
 from gpca.declarations.result import Frame, Paths, numbers
 from gpca.declarations.step import Plan, Step, Wildcards
 from gpca.errors import InputError, with_key
-from gpca.evaluation.intervals import UNTRAINED, Clustered, best_of, interval, weighted_mean
+from gpca.evaluation.intervals import TRIVIAL, Clustered, best_of, interval, weighted_mean
 from gpca.evaluation.measures import ALL, POOLED, TEST_SAMPLES, intervals, source_method_seed, tidy
 from gpca.experiments.explained import explainer_settings, require_explained
 from gpca.explainers.gpca import GPCA_FORMS
-from gpca.explainers.interface import BARE
+from gpca.explainers.interface import BARE, REENACTED
 from gpca.explainers.registry import explainer_entry, explainer_module
 from gpca.io.csv_file import numbers as number_column
 from gpca.settings import changes_of
@@ -26,7 +26,7 @@ from gpca.steps.control_samples import HARD, PAPER, RETRAINED, TRAININGS, TRANSF
 
 CALLS, AUROC = "icp_calls", "auroc_error"
 SECTION = "Beyond the paper: what explainers look at, and whether it carries over"
-USUAL, RIVAL, NO_TRAINING = "usual", "rival", "untrained"  # kinds of differences, the column `against`
+USUAL, RIVAL, OF_TRIVIAL = "usual", "rival", "trivial"  # kinds of differences, the column `against`
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,6 +83,11 @@ def _controls_of(plan: Plan, wildcards: Wildcards) -> tuple[list[str], list[str]
     return controls, [name for name in controls if name in RETRAINED]
 
 
+def _reenacted(plan: Plan) -> bool:
+    """Whether an explainer of the hard samples reads their re-enactments."""
+    return any(explainer_entry(name).reads == REENACTED for name in plan.config["controls"]["explainers"])
+
+
 def _other_sources(plan: Plan, wildcards: Wildcards) -> list[str]:
     return [name for name in plan.names["transfer_source"] if name != wildcards.source]
 
@@ -92,6 +97,7 @@ def _settings(plan: Plan, wildcards: Wildcards) -> dict[str, Any]:
     return {"controls": controls | {"controls": _controls_of(plan, wildcards)[0]}, "encoder": plan.encoder}
 
 
+HARD_REENACTED = f"{samples.HARD_REENACTMENTS}/{{source}}/seed{{seed}}.npz"
 HARD_FILE, SEED_FILE = "hard/{source}/seed{seed}.npz", "registrations/{source}/seed{seed}.npz"
 SAMPLE = Step(
     name="sample_hard",
@@ -105,6 +111,20 @@ SAMPLE = Step(
     settings=lambda plan, wildcards: {
         **plan.config["causes"],
         **plan.config["controls"]["hard"],
+        "icp": plan.config["registrations"]["icp"],
+    },
+)
+REENACT = Step(
+    name="reenact_hard",
+    run="gpca.steps.causes:reenact",
+    inputs={"causes": HARD_FILE, "causes_timings": "timings/{source}/hard/seed{seed}.csv"},
+    outputs={
+        "reenactments": HARD_REENACTED,
+        "timings": "timings/{source}/hard_reenactments/seed{seed}.csv",
+    },
+    settings=lambda plan, wildcards: {
+        "reenactment": plan.config["diagnosis"]["reenactment"],
+        "causes": {**plan.config["causes"], **plan.config["controls"]["hard"]},
         "icp": plan.config["registrations"]["icp"],
     },
 )
@@ -130,6 +150,9 @@ EXPLAIN = Step(
             f"registrations/{name}/seed{{seed}}.npz" for name in _other_sources(plan, wildcards)
         ],
         "hard": lambda plan, wildcards: [HARD_FILE] if HARD in _controls_of(plan, wildcards)[0] else [],
+        "hard_reenactments": lambda plan, wildcards: (
+            [HARD_REENACTED] if HARD in _controls_of(plan, wildcards)[0] and _reenacted(plan) else []
+        ),
         "encoder": "encoders/{source}/{control_embedding}/seed{seed}.pt",
         "embeddings": "embeddings/{source}/{control_embedding}/none/seed{seed}.npz",
         "retrained_embeddings": lambda plan, wildcards: [
@@ -225,8 +248,8 @@ def collect_intervals(run: Run, files: Paths) -> Frame:
 
     Of transfer there is a row for each source trained on, and one for all others together. Draws of families and seeds
     are the same for all explainers and controls of a source, so that differences are paired. Against ``usual``: the
-    paper's protocol, or the paper's training of the encoder, on the same seeds. Against ``rival`` and ``untrained``:
-    the best other explainer, and the best that needs no training, under the same control. ICP calls are those under
+    paper's protocol, or the paper's training of the encoder, on the same seeds. Against ``rival`` and ``trivial``:
+    the best other explainer, and the best trivial one, under the same control. ICP calls are those under
     the paper's protocol.
     """
     predictions = read_controls(files)
@@ -284,7 +307,7 @@ def _records(keys: tuple[str, str], trained_on: str, explainer: str, group: Mapp
         yield draws.record((*row, "", ""), interval(value_B, drawn_B_N))
         others = {USUAL: (usual, usual_values[metric])} if keys[0] != PAPER or usual != PAPER else {}
         if metric == "accuracy":
-            for kind, candidates in ((RIVAL, rivals), (NO_TRAINING, [name for name in UNTRAINED if name in rivals])):
+            for kind, candidates in ((RIVAL, rivals), (OF_TRIVIAL, [name for name in TRIVIAL if name in rivals])):
                 if other := best_of(accuracies, candidates):
                     others[kind] = other, accuracies[other]
         for kind, (other, other_B) in others.items():

@@ -18,9 +18,9 @@ from gpca.declarations.result import Frame, Paths, numbers
 from gpca.declarations.step import Step, Wildcards
 from gpca.encoders.registry import NamedEncoder, require_backbone, require_draws
 from gpca.errors import InputError, with_key
-from gpca.evaluation.intervals import ANYTHING, UNTRAINED, Clustered
+from gpca.evaluation.intervals import ANYTHING, TRIVIAL, Clustered
 from gpca.evaluation.measures import ALL, POOLED, Measure, Rivals, compared, intervals, tidy
-from gpca.explainers.interface import BARE, REENACTED, icp_calls
+from gpca.explainers.interface import BARE, EMBEDDINGS, REENACTED, icp_calls
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module, explainers, require_settings
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import part_of
@@ -84,13 +84,20 @@ EXPERIMENT = Experiment(
 )
 
 
-FOLDERS = {"embeddings": "cause_embeddings", REENACTED: "reenactments", BARE: "causes"}  # by what is read
+FOLDERS = {EMBEDDINGS: "cause_embeddings", REENACTED: "reenactments", BARE: "causes"}  # by what is read
 
 
 def _folder_read(wildcards: Wildcards) -> str:
     return FOLDERS.get(explainer_entry(wildcards.cause_explainer, CAUSES).reads, "descriptors")
 
 
+def _of_all(wildcards: Wildcards, folder: str) -> str | list[str]:
+    """Files of all sources; none for an explainer of embeddings, which are of an encoder of one source."""
+    is_embedded = explainer_entry(wildcards.cause_explainer, CAUSES).reads == EMBEDDINGS
+    return [] if is_embedded else f"{folder}/{{*source}}/seed{{*seed}}.npz"
+
+
+FURTHER = "learning_samples/{*source}/chunk{*chunk}.npz"
 DIAGNOSE = Step(
     name="diagnose",
     run="gpca.steps.diagnosis:diagnose",
@@ -98,6 +105,11 @@ DIAGNOSE = Step(
         "causes": "causes/{source}/seed{*seed}.npz",
         "read": lambda plan, wildcards: f"{_folder_read(wildcards)}/{{source}}/seed{{*seed}}.npz",
         "read_timings": lambda plan, wildcards: f"timings/{{source}}/{_folder_read(wildcards)}/seed{{*seed}}.csv",
+        "all_causes": lambda plan, wildcards: _of_all(wildcards, "causes"),
+        "all_read": lambda plan, wildcards: _of_all(wildcards, _folder_read(wildcards)),
+        "further": lambda plan, wildcards: (
+            FURTHER if explainer_entry(wildcards.cause_explainer, CAUSES).further else []
+        ),
     },
     outputs={
         "predictions": "diagnoses/{source}/{cause_explainer}/seed{*seed}.csv",
@@ -115,7 +127,12 @@ DIAGNOSE = Step(
 DIAGNOSE_BY_FEATURES = Step(
     name="diagnose_by_features",
     run="gpca.steps.diagnosis:diagnose_by_features",
-    inputs={"causes": "causes/{source}/seed{*seed}.npz", "descriptors": "descriptors/{source}/seed{*seed}.npz"},
+    inputs={
+        "causes": "causes/{source}/seed{*seed}.npz",
+        "descriptors": "descriptors/{source}/seed{*seed}.npz",
+        "all_causes": "causes/{*source}/seed{*seed}.npz",
+        "all_read": "descriptors/{*source}/seed{*seed}.npz",
+    },
     outputs={"predictions": "feature_diagnoses/{source}/{*feature_explainer}/seed{*seed}.csv"},
     settings=("diagnosis.by_features", "diagnosis.descriptors"),
     modules=lambda plan: [explainer_module(name, CAUSES) for name in plan.names["feature_explainer"]],
@@ -183,7 +200,7 @@ def by_source(judged: Mapping[tuple[str, str, int], Judged]) -> dict[str, dict[s
 # The ceiling is no rival, and none of it.
 AGAINST: Mapping[str, Rivals] = {
     "rival": lambda name, names: () if name == CEILING else [other for other in names if other != CEILING],
-    "untrained": lambda name, names: () if name == CEILING else UNTRAINED,
+    "trivial": lambda name, names: () if name == CEILING else TRIVIAL,
 }
 
 

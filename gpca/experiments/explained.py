@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 from gpca.errors import with_key
-from gpca.explainers.registry import explainer_entry, require_settings
+from gpca.explainers.registry import CONCEPTS, explainer_entry, require_settings
 
 
 def require_explained(config: Mapping[str, Any], key: str) -> Iterator[tuple[str, str]]:
@@ -16,7 +16,7 @@ def require_explained(config: Mapping[str, Any], key: str) -> Iterator[tuple[str
     for part in key.split("."):
         section = section[part]
     for name, settings in explainer_settings(config, section).items():
-        with_key(f"{key}.{name}", require_settings, name, settings)
+        with_key(f"{key}.{name}", require_settings, name, settings, CONCEPTS, key == "controls.explainers")
         yield f"{key}.{name}", name
 
 

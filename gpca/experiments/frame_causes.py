@@ -21,7 +21,7 @@ from gpca.errors import InputError
 from gpca.evaluation.intervals import REPEATS, Clustered, pigeonhole_weights
 from gpca.evaluation.measures import ALL, intervals
 from gpca.experiments import cause_tables as tables
-from gpca.experiments.diagnosis import TABLE, cause_costs, cause_titles, compared_samples
+from gpca.experiments.diagnosis import FURTHER, TABLE, cause_costs, cause_titles, compared_samples
 from gpca.experiments.frames import title_of_frames
 from gpca.explainers.interface import REENACTED
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module
@@ -71,10 +71,11 @@ def _inside(plan: Plan) -> list[str]:
     return [name for name in plan.config["diagnosis"]["explainers"] if name not in plan.names["outside_explainer"]]
 
 
-def _if_enacted(plan: Plan, files: str) -> str | list[str]:
-    """Files of re-enactments, where an explainer of causes reads any."""
-    read = [explainer_entry(name, CAUSES).reads for name in plan.config["diagnosis"]["explainers"]]
-    return files if REENACTED in read else []
+def _if_read(plan: Plan, files: str) -> str | list[str]:
+    """Files of re-enactments or further samples, where an explainer of causes reads any."""
+    entries = [explainer_entry(name, CAUSES) for name in plan.config["diagnosis"]["explainers"]]
+    read = (entry.further if files == FURTHER else entry.reads == REENACTED for entry in entries)
+    return files if any(read) else []
 
 
 DIAGNOSE_FRAMES = Step(
@@ -82,10 +83,11 @@ DIAGNOSE_FRAMES = Step(
     run="gpca.steps.diagnosis:diagnose_frames",
     inputs={
         "frame_causes": "frame_causes/seed{seed}.npz",
-        "frame_reenactments": lambda plan, wildcards: _if_enacted(plan, "reenactments/{frames}/seed{seed}.npz"),
+        "frame_reenactments": lambda plan, wildcards: _if_read(plan, "reenactments/{frames}/seed{seed}.npz"),
         "causes": "causes/{*source}/seed{seed}.npz",
         "descriptors": "descriptors/{*source}/seed{seed}.npz",
-        "reenactments": lambda plan, wildcards: _if_enacted(plan, "reenactments/{*source}/seed{seed}.npz"),
+        "reenactments": lambda plan, wildcards: _if_read(plan, "reenactments/{*source}/seed{seed}.npz"),
+        "further": lambda plan, wildcards: _if_read(plan, FURTHER),
         "encoders": "cause_encoders/{*source}/seed{seed}.pt",
         "embeddings": "cause_embeddings/{*source}/seed{seed}.npz",
     },
@@ -221,7 +223,7 @@ MISSED_NOTE = (
 )
 MEASURED = {
     STATE: show(STATE, "State (%)"),
-    "gain": show(STATE, tables.SHOWN["gain"].title, where={"against": "untrained"}, **tables.POINTS),
+    "gain": show(STATE, tables.SHOWN["gain"].title, where={"against": "trivial"}, **tables.POINTS),
     "lead": show(STATE, tables.SHOWN["lead"].title, where={"against": "rival"}, **tables.POINTS),
     **{key: each for key, each in tables.SHOWN.items() if key not in ("gain", "lead", "balanced_accuracy")},
 }
@@ -267,8 +269,8 @@ def table9_frames(run: Run, intervals):
         "each cause by itself.",
         "An instance counts once, whatever its number of starts. In brackets: the 95 % interval of "
         f"{REPEATS} bootstrap draws over scenes. Bold: best of these starts.",
-        "State: mean share of the nominal and of the failed that is called so. Over untrained, lead: State minus "
-        "that of the best untrained row and of the best other row, on the same draws. n: starts that are nominal "
+        "State: mean share of the nominal and of the failed that is called so. Over trivial, lead: State minus "
+        "that of the best trivial row and of the best other row, on the same draws. n: starts that are nominal "
         "or failed. The others as in Table IX. The rule counts points against the part of the model that the "
         "camera would see, which is not what it was made for: here it is a control. A re-enactment also reads "
         "the mesh, the camera and the pixels of the object.",

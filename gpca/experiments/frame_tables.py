@@ -6,7 +6,7 @@ from typing import Any
 from gpca.declarations.plan import Run
 from gpca.declarations.result import table
 from gpca.encoders.registry import make_encoder, parameter_count
-from gpca.evaluation.intervals import UNTRAINED
+from gpca.evaluation.intervals import TRIVIAL
 from gpca.evaluation.measures import ALL
 from gpca.experiments import frames
 from gpca.experiments.explained import titles
@@ -51,7 +51,7 @@ def table6_backbones(run: Run, intervals, metrics):
         {name: frames.BACKBONES.get(name, name) for name in names}
         for names in (section["backbones"], section["published"].values())
     )
-    untrained = {name: title for name, title in titles(section["explainers"]).items() if name in UNTRAINED}
+    untrained = {name: title for name, title in titles(section["explainers"]).items() if name in TRIVIAL}
     of_frames = {"table": TOGETHER, "source": REAL_WORLD}
     rows = [
         Row(

@@ -1,7 +1,6 @@
 """Diagnosis of causes by the number of training samples: an estimate of what an observer can reach."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from gpca.causes.judged import CEILING
@@ -11,68 +10,54 @@ from gpca.declarations.result import Frame, Paths, figure, numbers
 from gpca.declarations.step import Step
 from gpca.errors import InputError
 from gpca.evaluation.measures import read_samples, tidy
+from gpca.experiments.diagnosis import FURTHER
 from gpca.io.csv_file import read_numbers
-from gpca.settings import Distinct, read_settings
+from gpca.settings import read_settings
 from gpca.steps.learning_curve import CURVE_COLUMNS, MEASURED, CurveSettings, labeled_samples
 
 NAME = "learning_curve"
-FILES = "learning_curve/{curve_source}/seed{curve_seed}.csv"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Section(CurveSettings):
-    """The learning curve, and the sources whose objects are registered."""
-
-    sources: Distinct[str]
+FILES = "learning_curve/{source}/seed{curve_seed}.csv"
 
 
 def check(config: dict, _left_out: LeftOut) -> None:
-    section = config[NAME]
-    pool = labeled_samples(config["causes"]) + section["further"]
-    if max(section["sizes"]) > pool:
-        fault = f"{max(section['sizes'])} is more than the {pool} labeled samples that there are"
+    pool = len(config["sources"]) * (labeled_samples(config["causes"]) + config[NAME]["further"])
+    if (least := min(config[NAME]["sizes"])) > pool:
+        fault = f"{least} is more than the {pool} labeled samples that there are"
         raise InputError("config key learning_curve.sizes", fault, "lower it, or raise learning_curve.further")
 
 
-def without_sources(config: Mapping[str, Any]) -> dict[str, Any]:
-    """The config's section as jobs get it, which are of one source each."""
-    return {name: value for name, value in config[NAME].items() if name != "sources"}
-
-
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    settings = read_settings(CurveSettings, without_sources(config))
+    settings = read_settings(CurveSettings, config[NAME])
     return {
-        "curve_source": list(config[NAME]["sources"]),
         "curve_seed": list(config["seeds"])[: settings.seeds],
         "chunk": list(range(len(settings.chunks()))),
     }
 
 
-EXPERIMENT = Experiment(
-    name=NAME, sections={NAME: Section}, names=names, check=check, lists={"learning_curve.sources": "sources"}
-)
+EXPERIMENT = Experiment(name=NAME, sections={NAME: CurveSettings}, names=names, check=check)
 DRAW = Step(
     name="learning_samples",
     run="gpca.steps.learning_curve:learning_samples",
     inputs={"objects": "objects/{source}.npz"},
-    outputs={"samples": "learning_samples/{source}/seed{seed}/chunk{chunk}.npz"},
+    outputs={"samples": "learning_samples/{source}/chunk{chunk}.npz"},
     settings=lambda plan, wildcards: {
-        NAME: without_sources(plan.config),
+        NAME: plan.config[NAME],
         "causes": plan.config["causes"],
         "icp": plan.config["registrations"]["icp"],
     },
+    params={"seed": lambda plan, _wildcards: plan.config["seeds"][0]},
     priority=5,
 )
 LEARN = Step(
     name="learn_from_more",
     run="gpca.steps.learning_curve:learn_from_more",
     inputs={
-        "causes": "causes/{source}/seed{seed}.npz",
-        "descriptors": "descriptors/{source}/seed{seed}.npz",
-        "samples": "learning_samples/{source}/seed{seed}/chunk{*chunk}.npz",
+        "causes": "causes/{*source}/seed{seed}.npz",
+        "descriptors": "descriptors/{*source}/seed{seed}.npz",
+        "samples": FURTHER,
     },
     outputs={"out": "learning_curve/{source}/seed{seed}.csv"},
-    settings=lambda plan, _wildcards: {NAME: without_sources(plan.config)},
+    settings=(NAME,),
     priority=4,
 )
 
@@ -111,8 +96,7 @@ def learning_curve(run: Run, curves):
 
     lines = {"trees": ("Extremely randomized trees", BLUE), "gpca": ("GP-CA's classifier", ORANGE)}
     rows = {"balanced_accuracy": "balanced accuracy (%)", "regret": "regret (%)"}
-    chosen = run.config[NAME]["sources"]
-    present = set(curves["source"]) & set(chosen)
+    present = set(curves["source"])
     shown = {name: title for name, title in run.source_titles.items() if name in present}
     page, axes = panels(len(rows), len(shown), 0.6 + 1.5 * len(rows), COLUMN_WIDTH_IN, sharex=True, sharey="row")
     ticks = sorted(curves.loc[curves["learner"] != CEILING, "samples"].unique())

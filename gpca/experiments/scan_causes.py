@@ -25,7 +25,7 @@ from gpca.declarations.result import Frame, Paths, numbers
 from gpca.declarations.step import Step
 from gpca.encoders.registry import encoder_module
 from gpca.errors import InputError, with_key
-from gpca.evaluation.intervals import best_of, interval, pigeonhole_weights
+from gpca.evaluation.intervals import TRIVIAL, best_of, corrected, interval, pigeonhole_weights
 from gpca.evaluation.measures import ALL, POOLED
 from gpca.experiments.frame_causes import count_ends, ends_of
 from gpca.experiments.scans import EACH_SET, ChoiceSettings, files_of_set, place_of_set
@@ -185,7 +185,7 @@ def collect(run: Run, causes_files: Paths, sample_files: Paths, prediction_files
     """Measures with intervals over clusters of scenes and seeds, and counts.
 
     Sources are data sets of scans, and all of them together. Conditions are natural registrations of all starts or of
-    a kind, and those with noise added. ``difference`` is the paired difference from the best gate.
+    a kind, and those with noise added. ``difference`` is the paired difference from the best gate or trivial row.
     """
     import pandas as pd
 
@@ -211,11 +211,16 @@ def collect(run: Run, causes_files: Paths, sample_files: Paths, prediction_files
             if condition in (NATURAL, ADDED) and mask_N.any():
                 parts = {key: every.subset(mask_N) for key, every in judged.items()}
                 rows += _measures((source, condition, EVERY), parts, seen["cluster"][mask_N].to_numpy(str))
-    return pd.DataFrame(rows, columns=list(COLUMNS))
+    collected = pd.DataFrame(rows, columns=list(COLUMNS))
+    leads, bounds = collected[collected["gate"] != ""], ["difference_low", "difference_high"]
+    for _, of in leads.groupby(["source", "condition", "stratum", "metric"], sort=False):
+        value_M, low_M, high_M, clusters_M = (of[name].to_numpy(float) for name in ("difference", *bounds, "clusters"))
+        collected.loc[of.index, bounds] = np.column_stack(corrected(value_M, low_M, high_M, clusters_M))
+    return collected
 
 
 def read_scan_causes(path: str | Path) -> Frame:
-    """Read what :func:`collect` returned; a value may lack an interval, and a difference from a gate."""
+    """Read what :func:`collect` returned; a value may lack an interval, and a difference from the trivial ones."""
     return read_numbers(path, COLUMNS, NUMBERS, optional=NUMBERS[4:]).assign(concept=ALL)
 
 
@@ -266,13 +271,18 @@ def _measures(
             continue
         counted_N = counted_of_scans(any_samples, metric)
         drawn_B_n = drawn_B_N[:, counted_N] if metric in (*answers.SHARES, CAUSES) else None
-        gates = [names[other] for other in judged if other[1].startswith(GATE) and other != key]
+        gates = [names[other] for other in judged if other != key and is_trivial(other[1])]
         lead = NO_LEAD
         gate = best_of(drawn, gates, metric in answers.SMALLER_IS_BETTER)
         if gate and key[1] != answers.CEILING and metric != SAMPLES:
             lead = (gate, *interval(value_B - drawn[gate], drawn_B_n, difference=True))
         counts = int(counted_N.sum()), len(set(cluster_N[counted_N])), len(set(any_samples.seed[counted_N].tolist()))
         yield (*place, *key, metric, *counts, *interval(value_B, drawn_B_n), *lead)
+
+
+def is_trivial(explainer: str) -> bool:
+    """Whether an explainer of scans is a gate or one of `TRIVIAL`."""
+    return explainer.startswith(GATE) or explainer in TRIVIAL
 
 
 def scan_measures(samples: answers.Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:

@@ -19,10 +19,10 @@ from gpca.declarations.result import Frame, Paths, numbers, table
 from gpca.declarations.step import Plan, Step, Wildcards
 from gpca.encoders.registry import encoder_module
 from gpca.errors import InputError, with_key
-from gpca.evaluation.intervals import ANYTHING, REPEATS, UNTRAINED, Clustered
+from gpca.evaluation.intervals import ANYTHING, REPEATS, TRIVIAL, Clustered
 from gpca.evaluation.measures import POOLED, Rivals, compared, intervals
 from gpca.experiments.cause_tables import AGAIN, SECTION, SHOWN
-from gpca.experiments.diagnosis import CAUSES_FILES, TABLE
+from gpca.experiments.diagnosis import CAUSES_FILES, FURTHER, TABLE
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module
 from gpca.io.container import require_same_samples
 from gpca.reporting.sheet import Row, Sheet, Show, show
@@ -111,6 +111,7 @@ DIAGNOSE = Step(
         **{name: f"{name}/{{*source}}/seed{{seed}}.npz" for name in EACH},
         "encoders": "cause_encoders/{*source}/seed{seed}.pt",
         "embeddings": "cause_embeddings/{*source}/seed{seed}.npz",
+        "further": FURTHER,
         **{
             f"shifted_{name}": files.replace("{shift}", "{*shift}").replace("{*shift_seed}", "{seed}")
             for name, files in EACH.items()
@@ -131,7 +132,7 @@ DIAGNOSE = Step(
 
 def trained(name: str) -> bool:
     """Whether an explainer learns and reads no re-enactment: a rival of what needs no training."""
-    return name != CEILING and name not in UNTRAINED and "reenactment" not in explainer_entry(name, CAUSES).sees
+    return name not in (CEILING, *TRIVIAL[:3]) and "reenactment" not in explainer_entry(name, CAUSES).sees
 
 
 @numbers(
@@ -212,9 +213,9 @@ SHOWN_OF_SHIFTS = {
 
 def knows(name: str) -> str:
     """What an explainer knows of the generator that the samples of Table IX are drawn by."""
-    if name in UNTRAINED[:2]:
+    if name in TRIVIAL[:2]:
         return "nothing"
-    if name in UNTRAINED:
+    if name == "rule":
         return "its limits"
     sees = explainer_entry(name, CAUSES).sees
     further = ["its starts and limits, and every registration method"] if "reenactment" in sees else []

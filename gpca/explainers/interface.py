@@ -185,6 +185,7 @@ class ExplainerEntry:
         False  # whether it knows the truth about what it explains: an upper bound, which its title has to say
     )
     observed_only: bool = False  # of a design's outcomes it reads the first alone, that of the observed pair
+    further: bool = False  # whether it learns from further samples too, which have quick descriptors alone
 
     def __post_init__(self) -> None:
         if not isinstance(self.sees, tuple) or not set(self.sees) <= set(PARTS):

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.explainers.interface import Describing, ExplainerEntry
+from gpca.explainers.interface import REENACTED, Describing, ExplainerEntry
 from gpca.pairs.dataset import Registrations
 from gpca.process.registry import Registry
 from gpca.settings import require_arguments
@@ -32,9 +32,16 @@ def explainer_entry(name: str, kind: str = CONCEPTS) -> ExplainerEntry:
     return REGISTRIES[kind].entry(name)
 
 
-def require_settings(name: str, settings: Mapping[str, object], kind: str = CONCEPTS) -> None:
-    """Raise an InputError unless the explainer is known and takes these settings."""
-    require_arguments(f"explainer '{name}'", explainer_entry(name, kind).make, 2, settings)
+def require_settings(name: str, settings: Mapping[str, object], kind: str = CONCEPTS, reenacted: bool = False) -> None:
+    """Raise an InputError unless the explainer is known, takes these settings and has what it reads.
+
+    Of perturbed samples, those of the control ``hard`` alone are `reenacted`.
+    """
+    entry = explainer_entry(name, kind)
+    require_arguments(f"explainer '{name}'", entry.make, 2, settings)
+    if kind == CONCEPTS and entry.reads == REENACTED and not reenacted:
+        fault = "reads re-enactments, which no samples but those of the control hard have"
+        raise InputError(f"explainer '{name}'", fault, "name it in controls.explainers alone")
 
 
 def explainer_module(name: str, kind: str = CONCEPTS) -> str:
@@ -47,7 +54,7 @@ def make_rivals(explainers: Mapping[str, Mapping], source: str, seed: int) -> di
         raise InputError("setting explainers", "is empty", "name at least one")
     rivals = {}
     for name, settings in explainers.items():
-        require_settings(name, settings)
+        require_settings(name, settings, reenacted=True)
         entry = explainer_entry(name)
         rivals[name] = replace(entry, make=partial(entry.make, source, seed, **settings))
     return rivals

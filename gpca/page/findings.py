@@ -9,7 +9,7 @@ import numpy as np
 from gpca.active_learning.curves import TABLE
 from gpca.active_learning.settings import JUDGED_SHARE, rare_setting
 from gpca.causes.judged import CEILING
-from gpca.evaluation.intervals import UNTRAINED
+from gpca.evaluation.intervals import TRIVIAL
 from gpca.evaluation.measures import ALL, POOLED, read_clustered, read_metrics
 from gpca.experiments.frames import read_together
 from gpca.explainers.gpca import GPCA_FORMS
@@ -74,7 +74,7 @@ def _concepts(metrics: Frame, titles: Titles) -> Iterator[Finding]:
     others = {
         name: accuracies[name].mean()
         for name, entry in titles.explainers.items()
-        if name in accuracies and not entry["oracle"] and name not in GPCA_FORMS and name not in UNTRAINED
+        if name in accuracies and not entry["oracle"] and name not in GPCA_FORMS and name not in TRIVIAL
     }
     if forms and others:
         best, best_form = max(others, key=others.__getitem__), max(forms, key=forms.__getitem__)
@@ -107,11 +107,11 @@ def _causes(intervals: Frame, titles: Titles) -> Iterator[Finding]:
             f"and the dominant causes of failed ones apart with a balanced accuracy of {_percent(row['value'])} "
             f"(95 % interval {_bounds(row)} %): {words[best]}."
         )
-        gains = intervals[(intervals["metric"] == "balanced_accuracy") & (intervals["against"] == "untrained")]
+        gains = intervals[(intervals["metric"] == "balanced_accuracy") & (intervals["against"] == "trivial")]
         for gain in gains[(gains["source"] == row["source"]) & (gains["method"] == best)].to_dict("records"):
             if gain["other"] in words:
                 text += (
-                    f" The best untrained rival, {words[gain['other']]}, is {100 * gain['value']:.0f} points behind "
+                    f" The best trivial rival, {words[gain['other']]}, is {100 * gain['value']:.0f} points behind "
                     f"({_bounds(gain)})."
                 )
         if "gpca" in trained and best != "gpca":
@@ -138,7 +138,7 @@ def _pooled(intervals: Frame, titles: Titles, metric: str) -> tuple[Frame, list[
     if source != POOLED and rows["source"].nunique() != 1:
         rows = rows[:0]
     rows = rows[rows["source"] == source].set_index("method")
-    return rows, [name for name in titles.cause_explainers if name in rows.index and name not in UNTRAINED]
+    return rows, [name for name in titles.cause_explainers if name in rows.index and name not in TRIVIAL]
 
 
 def _frames(metrics: Frame, titles: Titles) -> Iterator[Finding]:

@@ -33,6 +33,7 @@ CONTROLS: tuple[str, ...] = get_args(Control)
 UNSEEN = "unseen_objects"
 SEEN = "seen_objects"  # the explainers for unseen objects, tested on new samples of training objects
 HARD = "hard"  # other samples, in which no state is perfect and the label is measured
+HARD_REENACTMENTS = "hard_reenactments"  # their folder
 RETRAINED = ("density", UNSEEN, HARD)  # have another encoder
 OF_EVERY_SEED = (UNSEEN, HARD)  # with another encoder for every seed
 Training = Literal["random_draws"]

@@ -16,7 +16,7 @@ from gpca.attribution.predictions import prediction_frame
 from gpca.classifier.scores import Attribution
 from gpca.encoders.registry import EncoderSettings
 from gpca.explainers.gpca import GPCA_FORMS
-from gpca.explainers.interface import BARE, Describing, Encoding, ExplainerEntry, answer_of
+from gpca.explainers.interface import BARE, REENACTED, Describing, Encoding, ExplainerEntry, answer_of
 from gpca.explainers.registry import Embed, described_for, make_rivals
 from gpca.io.csv_file import write_csv
 from gpca.jobs.job import Job
@@ -27,6 +27,7 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.settings import read_settings
 from gpca.steps import control_samples as samples
 from gpca.steps.control_samples import HARD, LABELS, PAPER, RELABELED, RETRAINED, SEEN, TRANSFER, UNSEEN
+from gpca.steps.diagnosis import with_what_it_reads
 from gpca.uncertainty.designs import evaluate_design
 from gpca.uncertainty.settings import UncertaintySettings
 
@@ -48,7 +49,7 @@ def explain(job: Job) -> None:
     others = dict(zip(job.others, job.other_registrations, strict=True))
     axes = (job.source, job.seed)
     inputs = [job.objects, job.registrations, job.encoder, job.embeddings]
-    inputs += [*retrained.values(), *others.values(), *job.get("hard", [])]
+    inputs += [*retrained.values(), *others.values(), *job.get("hard", []), *job.get("hard_reenactments", [])]
     with record_provenance([job.predictions, job.samples, job.timings], inputs, job.settings, seed=job.seed):
         registrations = Registrations.load(job.registrations, axes)
         hard = next((Registrations.load(path, axes) for path in job.get("hard", [])), None)
@@ -56,6 +57,8 @@ def explain(job: Job) -> None:
         for control, path in retrained.items():
             if control == HARD and hard:
                 embeddings[control] = read_embedding(path, hard, logits=True)
+                for enacted in job.get("hard_reenactments", []):
+                    embeddings[control] |= dict(with_what_it_reads(hard, REENACTED, enacted).attached)
             elif not samples.left_out(control, registrations, settings, encoder.backbone):
                 changed = samples.variant(control, registrations, *axes, settings, icp)
                 embeddings[control] = read_embedding(path, changed, logits=True)
@@ -254,6 +257,8 @@ class ControlRun:
             for name, rival in rivals.items():
                 explainer = rival.make()
                 if control in RELABELED and getattr(explainer, "trained_with_encoder", False):
+                    continue
+                if control != HARD and rival.reads == REENACTED:
                     continue
                 with self.costs.count_learning(control, name):
                     explainer.fit(train)

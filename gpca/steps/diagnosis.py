@@ -1,7 +1,7 @@
 """The steps of diagnoses: explainers of causes on held-out objects, on parts of what is read, and on depth frames."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -14,11 +14,20 @@ from gpca.attribution.predictions import prediction_frame, read_timings, write_p
 from gpca.causes.dataset import LABELS, Causes, labeled, observed_only
 from gpca.causes.descriptors import Descriptors, describe_all
 from gpca.causes.settings import OBJECTS, DescriptorSettings
+from gpca.causes.training import LabeledSamples, joined_without
 from gpca.causes.truth import BORDERLINE
 from gpca.classifier.scores import Attribution
 from gpca.encoders.registry import EncoderSettings
 from gpca.errors import InputError
-from gpca.explainers.interface import BARE, EMBEDDINGS, REENACTED, ExplainerEntry, answer_of, icp_calls
+from gpca.explainers.interface import (
+    BARE,
+    EMBEDDINGS,
+    REENACTED,
+    ConceptExplainer,
+    ExplainerEntry,
+    answer_of,
+    icp_calls,
+)
 from gpca.explainers.registry import CAUSES, explainer_entry
 from gpca.io.csv_file import write_csv
 from gpca.jobs.job import Job
@@ -38,11 +47,14 @@ def diagnose(job: Job) -> None:
     remedies = DescriptorSettings(**json.loads(job.remedies))
     reenactment = ReenactmentSettings(**json.loads(job.reenactment))
     files = ("causes", "read", "read_timings", "predictions", "timings")
+    others, further = _others(job), job.get("further", [])
     for seed, path, read, read_timing, predictions, timings in job.per_seed(*files):
-        with record_provenance([predictions, timings], [path, read, read_timing], job.settings, seed=seed):
+        inputs = [path, read, read_timing, *(file for pair in others[seed] for file in pair), *further]
+        with record_provenance([predictions, timings], inputs, job.settings, seed=seed):
             causes = Causes.load(path, (job.source, seed))
             seconds_S, icp_seconds_S = read_timings(read_timing, causes.registrations)
-            attribution = explained(entry, job.settings, causes, path, read, remedies, reenactment)
+            learned = others[seed], further
+            attribution = explained(entry, job.settings, causes, path, read, remedies, reenactment, *learned)
             write_predictions(predictions, causes.registrations, attribution)
             write_timings(timings, causes.registrations, seconds_S + attribution.seconds_N, icp_seconds_S)
 
@@ -50,14 +62,24 @@ def diagnose(job: Job) -> None:
 def diagnose_by_features(job: Job) -> None:
     """Let learners that see more and more of a pair learn and explain, seed by seed -> their predictions."""
     remedies = DescriptorSettings(**job.section("descriptors"))
-    own = {(path.parts[-2], seed_of_file(path)): path for path in job.predictions}
-    with record_provenance(job.predictions, [*job.causes, *job.descriptors], job.settings):
+    own, others = {(path.parts[-2], seed_of_file(path)): path for path in job.predictions}, _others(job)
+    inputs = [*job.causes, *job.descriptors, *(file for pairs in others.values() for pair in pairs for file in pair)]
+    with record_provenance(job.predictions, inputs, job.settings):
         for seed, path, descriptors in job.per_seed("causes", "descriptors"):
             causes = Causes.load(path, (job.source, seed))
             for name, settings in job.section("by_features").items():
                 entry = explainer_entry(name, CAUSES)
-                attribution = explained(entry, settings or {}, causes, path, descriptors, remedies)
+                attribution = explained(entry, settings or {}, causes, path, descriptors, remedies, others=others[seed])
                 write_predictions(own[name, seed], causes.registrations, attribution)
+
+
+def _others(job: Job) -> dict[int, list[tuple[Path, Path]]]:
+    """Return the causes of the other sources and what is read of them, by seed."""
+    others: dict[int, list[tuple[Path, Path]]] = {seed: [] for seed in map(int, job.seeds)}
+    for path, read in zip(job.get("all_causes", []), job.get("all_read", []), strict=True):
+        if path.parent.name != job.source:
+            others[seed_of_file(path)].append((path, read))
+    return others
 
 
 def diagnose_frames(job: Job) -> None:
@@ -68,7 +90,7 @@ def diagnose_frames(job: Job) -> None:
     import pandas as pd
 
     learned = {"causes": job.causes, DESCRIBED: job.descriptors, "encoders": job.encoders, EMBEDDINGS: job.embeddings}
-    learned |= {REENACTED: job.get("reenactments", [])}  # only where an explainer reads them
+    learned |= {REENACTED: job.get("reenactments", []), "further": job.get("further", [])}  # where they are read
     enacted = job.get("frame_reenactments")
     inputs = [job.frame_causes, *filter(None, [enacted]), *(path for paths in learned.values() for path in paths)]
     with record_provenance([job.predictions], inputs, job.settings, seed=job.seed):
@@ -90,19 +112,42 @@ def explained(
     read: Path | None,
     remedies: DescriptorSettings,
     reenactment: ReenactmentSettings | None = None,
+    others: Iterable[tuple[Path, Path | None]] = (),
+    further: Iterable[Path] = (),
 ) -> Attribution:
     """Let an explainer learn from the training rows and explain all, and count the runs of ICP that it needs.
 
-    The causes are those of the file `path`, and `read` has what the explainer reads of them.
+    The causes are those of the file `path`, and `read` has what the explainer reads of them; `others` are the same
+    files of other sources, whose training rows are learned from too unless a family of theirs is tested. Files of
+    `further` samples are for an explainer that learns from these.
     """
     explainer = entry.make(*(causes.registrations.axes or ()), **settings)
     registrations = with_what_it_reads(labeled(causes), entry.reads, read)
-    explainer.fit(registrations.subset(training_rows(registrations, path)))
+    learned = [registrations.subset(training_rows(registrations, path))]
+    for other, other_read in others:
+        part = with_what_it_reads(labeled(Causes.load(other)), entry.reads, other_read)
+        learned.append(part.subset(training_rows(part, other)))
+    fit(explainer, entry, learned, further, registrations.cluster[causes.rows("test")])
     starts = causes.T_target_source_runs.shape[1]
     calls = icp_calls(entry.sees, starts, remedies, reenactment.calls(starts) if reenactment else 0)
     return replace(
         answer_of(explainer, observed_only(registrations), LABELS), icp_calls_N=np.full(len(registrations), calls)
     )
+
+
+def fit(
+    explainer: ConceptExplainer,
+    entry: ExplainerEntry,
+    learned: Sequence[Registrations],
+    further: Iterable[Path],
+    families: Sequence[str] | np.ndarray = (),
+) -> None:
+    """Let an explainer learn from labeled samples, perhaps from files of further ones, but of none of the families."""
+    if entry.further:
+        samples = [LabeledSamples.of(part) for part in learned] + [LabeledSamples.load(each) for each in further]
+        explainer.fit(joined_without(families, samples))  # type: ignore[arg-type]  # descriptors and labels are all
+    else:
+        explainer.fit(joined_without(families, learned))
 
 
 def training_rows(registrations: Registrations, path: Path) -> np.ndarray:
@@ -208,7 +253,8 @@ class World:
                 if self._fold_S is not None and len(np.unique(learned.concept)) < FEWEST_LABELS:
                     return None
                 explainer = entry.make(*self._axes, **settings)
-                explainer.fit(learned)
+                further = self._files.get("further", []) if learned_from == OBJECTS else []
+                fit(explainer, entry, [learned], further, self._left_out if learned_from == OBJECTS else ())
                 answers.append(answer_of(explainer, observed_only(asked.subset(rows)), LABELS))
             order = np.argsort(np.concatenate([rows for rows, _ in parts]))
             all_scores.append(np.concatenate([answer.scores_N_C for answer in answers])[order])

@@ -8,17 +8,16 @@ import numpy as np
 
 from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import prediction_frame
-from gpca.causes.dataset import LABELS, Causes, labels_of
-from gpca.causes.descriptors import WIDTHS, Descriptors, describe_motion, describe_starts, observed_pair
+from gpca.causes.dataset import LABELS, Causes, labeled, labels_of
+from gpca.causes.descriptors import describe_motion, describe_starts, observed_pair
 from gpca.causes.drawing import apportion, draw_further
 from gpca.causes.judged import CEILING, Judged, ceiling_of, judged_by, measure
 from gpca.causes.settings import CauseSettings
+from gpca.causes.training import QUICK, LabeledSamples, joined_without
 from gpca.causes.truth import BORDERLINE, GEOMETRY
 from gpca.classifier.scores import Attribution
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
-from gpca.io.arrays import TEXT
-from gpca.io.container import Container, array
 from gpca.io.csv_file import write_csv
 from gpca.io.frame import Frame
 from gpca.jobs.job import Job
@@ -28,9 +27,9 @@ from gpca.pairs.distances import describe_distances
 from gpca.process.progress import progress
 from gpca.seeds import generator, seed_of
 from gpca.settings import Bounds, Count, Distinct, read_settings
+from gpca.steps.diagnosis import DESCRIBED, training_rows, with_what_it_reads
 
 FEWEST = 20  # training samples of a learner
-GROUPS = ("distances", "planes", "motion", "starts")  # of descriptors, those that need no further registration
 TREES = 300
 LEARNERS = ("trees", "gpca")
 MEASURED = ("balanced_accuracy", "regret", "tied_accuracy", "dominant_accuracy", "auroc_failed")
@@ -42,14 +41,15 @@ class CurveSettings:
     """The training samples, and the learners of them.
 
     Attributes:
-        further: training samples of the same objects that are drawn besides those of the causes, all with a label.
+        further: training samples of each source, of all its objects, that are drawn besides those of the causes; all
+            have a label, and no explainer learns from those of families that it is asked about.
         chunk: how many of them a job draws, at most.
         sizes: numbers of labeled training samples that are learned from.
         orders: number of orders of the samples; a size takes the first samples of each.
     """
 
     seeds: Count = 1
-    further: Annotated[int, Bounds(minimum=12)] = 240
+    further: Annotated[int, Bounds(minimum=12)] = 90
     chunk: Annotated[int, Bounds(minimum=12)] = 600
     sizes: Distinct[Annotated[int, Bounds(minimum=FEWEST)]] = (50, 100, 200)
     orders: Count = 3
@@ -59,22 +59,6 @@ class CurveSettings:
         """Sizes of the chunks, as even as possible."""
         count = -(-self.further // self.chunk)
         return [self.further // count + (number < self.further % count) for number in range(count)]
-
-
-@dataclass(frozen=True)
-class LabeledSamples(Container):
-    """N labeled registrations, nominal or with the dominant cause: groups of descriptors (N, F)."""
-
-    distances: np.ndarray = array(f"N {WIDTHS['distances']}")
-    planes: np.ndarray = array(f"N {WIDTHS['planes']}")
-    motion: np.ndarray = array(f"N {WIDTHS['motion']}")
-    starts: np.ndarray = array(f"N {WIDTHS['starts']}")
-    label: np.ndarray = array("N", TEXT, choices=LABELS)
-
-    @property
-    def features(self) -> np.ndarray:
-        """All groups side by side (N, F)."""
-        return np.hstack([getattr(self, name) for name in GROUPS])
 
 
 def labeled_samples(causes: Mapping[str, Any]) -> int:
@@ -92,7 +76,7 @@ def learning_samples(job: Job) -> None:
     with record_provenance([job.samples], [job.objects], job.settings, seed=job.seed):
         objects = ObjectClouds.load(job.objects, job.source)
         samples = describe(draw_further(objects, job.source, job.seed, settings, chunk, wanted), ICPSettings(**icp))
-        samples.subset(np.isin(samples.label, LABELS)).save(job.samples, (job.source, job.seed))
+        samples.subset(np.isin(samples.concept, LABELS)).save(job.samples, (job.source, job.seed))
 
 
 def describe(causes: Causes, icp: ICPSettings) -> LabeledSamples:
@@ -103,25 +87,32 @@ def describe(causes: Causes, icp: ICPSettings) -> LabeledSamples:
     ):
         pair = observed_pair(causes, row)  # nothing in these is random
         rows.append((*describe_distances(pair), describe_motion(pair), describe_starts(pair, icp)))
-    groups: dict[str, Any] = {name: np.array([row[i] for row in rows]) for i, name in enumerate(GROUPS)}
-    return LabeledSamples(**groups, label=labels_of(causes.truth))
+    groups: dict[str, Any] = {name: np.array([row[i] for row in rows]) for i, name in enumerate(QUICK)}
+    return LabeledSamples(**groups, concept=labels_of(causes.truth), cluster=causes.registrations.cluster)
 
 
 def learn_from_more(job: Job) -> None:
-    """Pool the training samples, and learn from more and more of them."""
+    """Pool the training samples of all sources, and learn from more and more of them."""
     settings = read_settings(CurveSettings, job.section("learning_curve"))
     axes = (job.source, job.seed)
-    with record_provenance([job.out], [job.causes, job.descriptors, *job.samples], job.settings, seed=job.seed):
-        causes = Causes.load(job.causes, axes)
-        described = Descriptors.load(job.descriptors, causes.registrations)
-        groups: dict[str, Any] = {name: described.groups[name] for name in GROUPS}
-        samples = LabeledSamples(**groups, label=labels_of(causes.truth))
-        train, test = causes.rows("train"), causes.rows("test")
-        labeled = train[np.isin(samples.label[train], LABELS)]
-        pool = LabeledSamples.joined(
-            [samples.subset(labeled), *(LabeledSamples.load(path, axes) for path in job.samples)]
+    inputs = [*job.causes, *job.descriptors, *job.samples]
+    with record_provenance([job.out], inputs, job.settings, seed=job.seed):
+        sets = {}
+        for path, descriptors in zip(job.causes, job.descriptors, strict=True):
+            causes = Causes.load(path)
+            registrations = with_what_it_reads(labeled(causes), DESCRIBED, descriptors)
+            sets[registrations.axes or axes] = causes, registrations
+        if axes not in sets:
+            raise InputError("causes", f"are none of {job.source}, seed {job.seed}", "give its own file too")
+        causes, registrations = sets[axes]
+        test = causes.rows("test")
+        parts = [LabeledSamples.of(every.subset(training_rows(every, job.causes[0]))) for _, every in sets.values()]
+        parts += [LabeledSamples.load(path) for path in job.samples]
+        pool = joined_without(registrations.cluster[test], parts)
+        write_csv(
+            job.out,
+            learning_curve(pool, LabeledSamples.of(registrations.subset(test)), causes.subset(test), settings, *axes),
         )
-        write_csv(job.out, learning_curve(pool, samples.subset(test), causes.subset(test), settings, *axes))
 
 
 def learning_curve(
@@ -129,13 +120,15 @@ def learning_curve(
 ) -> Frame:
     """Row of `CURVE_COLUMNS` for each learner, size and order, and one of the truth from other starts.
 
-    An order is a permutation of the pool; a smaller size is part of a larger one in the same order. The tested samples
+    An order is a permutation of the pool; a smaller size is part of a larger one in the same order. Sizes above that of
+    the pool, which lacks the families that are tested, have no row. The tested samples
     are those of the truth.
     """
     import pandas as pd
 
-    if len(pool) < max(settings.sizes):
-        fault = f"{len(pool)} training samples are fewer than the largest size, {max(settings.sizes)}"
+    sizes = [size for size in sorted(settings.sizes) if size <= len(pool)]
+    if not sizes:
+        fault = f"{len(pool)} training samples of other families are fewer than the least size, {min(settings.sizes)}"
         raise InputError(f"learning curve of {source}", fault, "raise learning_curve.further or lower its sizes")
     orders = [
         generator(source, seed, "learning curve", "order", i).permutation(len(pool)) for i in range(settings.orders)
@@ -146,7 +139,7 @@ def learning_curve(
         return [float(measured[name][0]) for name in MEASURED]
 
     rows = [(CEILING, 0, 0, *values(ceiling_of(truth, seed)))]
-    fits = [(name, size, i) for size in sorted(settings.sizes) for i in range(settings.orders) for name in LEARNERS]
+    fits = [(name, size, i) for size in sizes for i in range(settings.orders) for name in LEARNERS]
     for name, size, i in progress(fits, f"learning curve of {source}, seed {seed}"):
         fit = _fit_trees if name == "trees" else _fit_gpca
         learned, given = pool.subset(orders[i][:size]), (source, seed, "learning curve", name, size, i)
@@ -165,7 +158,7 @@ def _fit_trees(learned: LabeledSamples, tested_N_F: np.ndarray, _settings: GPCSe
 
     state = seed_of(*axes) % 2**32
     forest = ExtraTreesClassifier(TREES, min_samples_leaf=2, max_features=0.3, random_state=state)
-    return ConceptClassifier(forest, LABELS).fit(learned.features, learned.label).scores(tested_N_F)
+    return ConceptClassifier(forest, LABELS).fit(learned.features, learned.concept).scores(tested_N_F)
 
 
 def _fit_gpca(learned: LabeledSamples, tested_N_F: np.ndarray, settings: GPCSettings, *axes: object) -> np.ndarray:
@@ -176,5 +169,5 @@ def _fit_gpca(learned: LabeledSamples, tested_N_F: np.ndarray, settings: GPCSett
     normalized = NormalizedFeatures(*axes)
     normalized.fit(learned.features)
     gpc = GPC(LABELS, settings, *axes[:2])
-    gpc.fit(normalized(learned.features), learned.label)
+    gpc.fit(normalized(learned.features), learned.concept)
     return gpc.attribute(normalized(tested_N_F))[0]

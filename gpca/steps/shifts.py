@@ -102,7 +102,7 @@ def diagnose(job: Job) -> None:
     import pandas as pd
 
     learned = {"causes": job.causes, DESCRIBED: job.descriptors, "encoders": job.encoders, EMBEDDINGS: job.embeddings}
-    learned |= {REENACTED: job.reenactments}
+    learned |= {REENACTED: job.reenactments, "further": job.get("further", [])}
     inputs = [path for paths in learned.values() for path in paths]
     inputs += [*job.shifted_causes, *job.shifted_descriptors, *job.shifted_reenactments]
     with record_provenance([job.predictions], inputs, job.settings, seed=job.seed):

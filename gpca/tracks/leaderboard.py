@@ -19,6 +19,7 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.tables.builder import TableBuilder
 from gpca.reporting.tables.cells import interval_cell, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
+from gpca.tracks.overall import overall
 from gpca.tracks.published import FOLDER as PUBLISHED
 from gpca.tracks.published import NO_CALLS, Method, Published
 from gpca.tracks.scoring import AGAINST, counts, score
@@ -123,10 +124,14 @@ def _footnotes(published: Published, submitted: Mapping[str, Method]) -> tuple[s
 
 
 def as_text_among(published: Published, submitted: Mapping[str, Method]) -> str:
-    """Return the table of submitted methods among the published ones as text, of the groups that they predict."""
+    """Return the table of submitted methods among the published ones as text, of the groups that they predict.
+
+    Without submitted methods, it has all groups.
+    """
     scores, against = score(published, submitted)
-    groups = scores["group"][scores["method"].isin(list(submitted))]
-    scores, against = (rows[rows["group"].isin(groups)] for rows in (scores, against))
+    if submitted:
+        groups = scores["group"][scores["method"].isin(list(submitted))]
+        scores, against = (rows[rows["group"].isin(groups)] for rows in (scores, against))
     return as_text(table_of(published, submitted, scores, against))
 
 
@@ -165,12 +170,14 @@ def read_submissions(folder: Path) -> tuple[dict[str, list[Submission]], list[st
 
 
 def boards(submissions: Mapping[str, Sequence[Submission]]) -> list[dict[str, Any]]:
-    """Return :func:`board_of` of all published tracks, with the submissions by the name of the track."""
-    return [
-        board_of(Published.load(track), submissions.get(name, ()))
+    """Return the board of all tracks, and :func:`board_of` each, with the submissions by the name of the track."""
+    tracks = [
+        (Published.load(track), submissions.get(name, ()))
         for name, track in TRACKS.items()
         if (PUBLISHED / f"{name}.npz").is_file()
     ]
+    together = overall([(of, {each.method.name: each.method for each in sent}) for of, sent in tracks])
+    return [together, *(board_of(*track) for track in tracks)]
 
 
 def board_of(published: Published, submissions: Sequence[Submission]) -> dict[str, Any]:

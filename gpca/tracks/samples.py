@@ -25,7 +25,7 @@ from gpca.frames.source import REAL_WORLD
 from gpca.jobs.provenance import RECORD
 from gpca.process.code_files import ROOT
 from gpca.process.plugins import named
-from gpca.steps.control_samples import HARD
+from gpca.steps.control_samples import HARD, HARD_REENACTMENTS
 from gpca.tracks.published import Published, require_clone, sha256_of_arrays
 from gpca.tracks.track import DEFAULT, Track
 
@@ -194,6 +194,13 @@ def recipe_of(file: str, config: Mapping[str, Any]) -> Recipe:
         given |= {"settings": frame_settings | {"initial_pose": frames["initial_pose"]}}
         outputs = {name: f"{name}/{source}.npz" for name in ("instances", "objects")}
         return Recipe("gpca.steps.frames:instances", given, _splits("scenes", config), outputs)
+    if kind == "learning_samples":
+        given = {"source": rest[0], "seed": config["seeds"][0], "chunk": rest[1].removeprefix("chunk")}
+        settings = {"learning_curve": config["learning_curve"], "causes": config["causes"]} | icp
+        inputs = {"objects": f"objects/{rest[0]}.npz"}
+        return Recipe(
+            "gpca.steps.learning_curve:learning_samples", given | {"settings": settings}, inputs, {"samples": file}
+        )
     seed = int(rest[-1].removeprefix("seed"))
     if kind == "repairs":
         from gpca.experiments.repair import own_settings
@@ -238,7 +245,12 @@ def recipe_of(file: str, config: Mapping[str, Any]) -> Recipe:
         return Recipe("gpca.steps.scan_causes:measure", given, {}, outputs)
     step, inputs = "gpca.steps.causes:causes", {"causes": path("causes"), "causes_timings": timings("causes")}
     outputs = {kind: path(kind), "timings": timings(kind)}
-    if kind in ("causes", HARD):
+    if kind == HARD_REENACTMENTS:
+        step, kind = "gpca.steps.causes:reenact", HARD
+        inputs = {"causes": path(HARD), "causes_timings": timings(HARD)}
+        outputs = {"reenactments": path(HARD_REENACTMENTS), "timings": timings(HARD_REENACTMENTS)}
+        settings = {"reenactment": diagnosis["reenactment"], "causes": causes | controls["hard"]} | icp
+    elif kind in ("causes", HARD):
         inputs = {"objects": f"objects/{source}.npz"}
         settings = causes | (controls["hard"] if kind == HARD else {}) | icp
         outputs = {"causes": path(kind), "candidates": path(kind, "csv"), "timings": timings(kind)}

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from gpca.attribution.weighted import augrc
 from gpca.causes.dataset import LABELS
 from gpca.causes.judged import CEILING, SHARES, Judged, ceiling_of, counted, joined, judged_of, measure, ranking
 from gpca.causes.truth import BORDERLINE, NOMINAL
@@ -23,6 +24,7 @@ from gpca.tracks.track import FRAMES_TRACK, HARD_TRACK, SCANS_TRACK
 
 COLUMNS = ("group", "method", "metric", "samples", "seeds", "value", "low", "high")
 AGAINST = ("against", "difference", "difference_low", "difference_high")  # of two methods' headlines
+AREA = "augrc"  # under the curve of generalized risk over coverage
 HARD_MEASURES = ("accuracy", *(f"recall_{concept}" for concept in CONCEPTS), "auroc_error")
 SHARES_OF_SAMPLES = (*SHARES, *HARD_MEASURES, SCAN_MEASURE)  # Wilson's interval in the place of one without width
 Arrays = dict[str, np.ndarray]
@@ -43,8 +45,7 @@ def score(published: Published, submitted: Mapping[str, Method]) -> tuple[Frame,
     differences: list[tuple] = []
     methods = {method.name: method for method in published.methods} | dict(submitted)
     for group, chosen, draws in groups_of(published):
-        complete = {name: method for name, method in methods.items() if np.isfinite(method.scores[chosen]).all()}
-        measured = _measured(published, complete, chosen, draws.weights * draws.once)
+        measured = measured_of(published, methods, chosen, draws)
         for name, (values, masks) in measured.items():
             for metric, value_B in values.items():
                 if np.isfinite(value_B[0]):
@@ -91,10 +92,15 @@ def groups_of(published: Published) -> Iterator[Group]:
         yield group(POOLED, np.ones(len(rows), bool), cluster_N)
 
 
-def _measured(
-    published: Published, methods: Mapping[str, Method], chosen: np.ndarray, weights_B_N: np.ndarray
+def measured_of(
+    published: Published, methods: Mapping[str, Method], chosen: np.ndarray, draws: Clustered
 ) -> dict[str, tuple[Arrays, Arrays]]:
-    """Return each method's measures (1 + B,) by name, and masks of the samples that each counts."""
+    """Return each method's measures (1 + B,) of rows by name, and masks of the samples that each counts.
+
+    A method that lacks scores for some of the rows is left out.
+    """
+    methods = {name: method for name, method in methods.items() if np.isfinite(method.scores[chosen]).all()}
+    weights_B_N = draws.weights * draws.once
     if published.track.name == HARD_TRACK:
         concept_N, measured = published.rows.concept, {}
         masks = {f"recall_{concept}": concept_N == concept for concept in CONCEPTS}
@@ -104,7 +110,8 @@ def _measured(
             values = {each: weighted_mean(right_N[mask_N], weights_B_N[:, mask_N]) for each, mask_N in masks.items()}
             entropy_N = Attribution.of_scores(CONCEPTS, method.scores, seconds=0.0).entropy_N
             values["auroc_error"] = ranking(entropy_N, ~right_N, weights_B_N)["area"]
-            measured[name] = values, masks | {"auroc_error": masks["accuracy"]}
+            values[AREA] = augrc(method.scores.max(axis=1), ~right_N, weights_B_N)
+            measured[name] = values, masks | dict.fromkeys(("auroc_error", AREA), masks["accuracy"])
         return measured
     judged = {}
     for name, method in methods.items():

@@ -115,6 +115,7 @@ _TRACKS = (
         seeds="controls.seeds",
         predictions="controls/{source}/seed{seed}.csv",
         labeled_by=("control", "tested", "explainer"),
+        read=("hard_reenactments/{source}/seed{seed}.npz",),
     ),
     Track(
         FRAMES_TRACK,

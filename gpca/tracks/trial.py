@@ -24,13 +24,14 @@ from gpca.jobs.job import Job
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import read_settings
-from gpca.steps.control_samples import HARD, ControlSettings
+from gpca.steps.control_samples import HARD, HARD_REENACTMENTS, ControlSettings
 from gpca.steps.controls import ControlRun
-from gpca.steps.diagnosis import DESCRIBED, explained, frames_to_explain
+from gpca.steps.diagnosis import DESCRIBED, explained, frames_to_explain, with_what_it_reads
+from gpca.steps.learning_curve import CurveSettings
 from gpca.steps.scan_causes import diagnose as diagnose_scans
 from gpca.tracks.published import NOTHING_NAMED, Method, label_numbers, predicted
 from gpca.tracks.samples import TrackSamples
-from gpca.tracks.track import CAUSES_TRACK, FRAMES_TRACK, SCANS_TRACK
+from gpca.tracks.track import CAUSES_TRACK, FRAMES_TRACK, HARD_TRACK, SCANS_TRACK
 from gpca.uncertainty.settings import UncertaintySettings
 
 # By an explainer's reads.
@@ -73,7 +74,7 @@ def try_method(
     Its inputs are measured beforehand, and their time is not counted.
     """
     track, rows = samples.track, samples.published.rows
-    require_settings(name, settings, track.kind)
+    require_settings(name, settings, track.kind, reenacted=track.name == HARD_TRACK)
     entry = explainer_entry(name, track.kind)
     parts = samples.parts()
     samples.files([track.file(source, seed) for source, seed, _ in parts])  # together, so that several are made at once
@@ -96,12 +97,20 @@ def _causes(trial: MethodTrial, source: str, seed: int) -> PartPredictions:
     samples, entry = trial.samples, trial.entry
     [path] = samples.files([samples.track.file(source, seed)])
     causes, diagnosis = Causes.load(path, (source, seed)), samples.config["diagnosis"]
-    read = None
-    if entry.reads != BARE:
-        [read] = samples.files([f"{FOLDERS.get(entry.reads, 'descriptors')}/{source}/seed{seed}.npz"])
+
+    def read_of(each: str) -> Path:
+        folder = "causes" if entry.reads == BARE else FOLDERS.get(entry.reads, FOLDERS[DESCRIBED])
+        return samples.files([f"{folder}/{each}/seed{seed}.npz"])[0]
+
     descriptors = DescriptorSettings(**diagnosis["descriptors"])
     reenactment = read_settings(ReenactmentSettings, diagnosis["reenactment"])
-    attribution = explained(entry, trial.settings, causes, path, read, descriptors, reenactment)
+    others = [
+        (samples.files([f"causes/{each}/seed{seed}.npz"])[0], read_of(each))
+        for each in dict.fromkeys(part for part, _, _ in samples.parts())
+        if each != source and entry.reads != EMBEDDINGS
+    ]
+    learned = others, _further(samples) if entry.further else []
+    attribution = explained(entry, trial.settings, causes, path, read_of(source), descriptors, reenactment, *learned)
     return PartPredictions.of(
         attribution, samples.track.labels, float(attribution.seconds_N.mean()), causes.rows("test")
     )
@@ -115,6 +124,9 @@ def _hard(trial: MethodTrial, source: str, seed: int) -> PartPredictions:
     if trial.entry.reads == EMBEDDINGS:
         [read] = samples.files([f"control_embeddings/{HARD}/{source}/seed{seed}.npz"])
         embeddings = read_embedding(read, hard, logits=True)
+    elif trial.entry.reads == REENACTED:
+        [read] = samples.files([f"{HARD_REENACTMENTS}/{source}/seed{seed}.npz"])
+        embeddings = dict(with_what_it_reads(hard, REENACTED, read).attached)
     controls = {key: value for key, value in config["controls"].items() if key not in ("explainers", "hard")}
     runs = {key: value for key, value in config["uncertainty"].get("removal", {}).items() if key != "samples"}
     run = ControlRun(
@@ -147,7 +159,9 @@ def _frames(trial: MethodTrial, source: str, seed: int) -> PartPredictions:
         [enacted] = samples.files([f"reenactments/{REAL_WORLD}/seed{seed}.npz"])
     job = Job(source=source, seed=seed, settings={**config["diagnosis"], "icp": config["registrations"]["icp"]})
     causes = Causes.load(path, (source, seed))
-    frames = frames_to_explain(job, causes, enacted, _training_files(samples, folders, seed))
+    learned = _training_files(samples, folders, seed)
+    learned["further"] = _further(samples) if trial.entry.further else []
+    frames = frames_to_explain(job, causes, enacted, learned)
     frames.prepare(trial.name)
     started = perf_counter()
     attribution = frames.attribution(trial.name, trial.settings)
@@ -184,6 +198,13 @@ def _scans(trial: MethodTrial) -> list[PartPredictions]:
         calls = float(rows["icp_calls"].mean())
         answers.append(PartPredictions(*predicted(rows, samples.track.labels), calls, seconds))
     return answers
+
+
+def _further(samples: TrackSamples) -> list[Path]:
+    """Return the files of further training samples of all sources."""
+    chunks = range(len(read_settings(CurveSettings, samples.config["learning_curve"]).chunks()))
+    names = [f"learning_samples/{source}/chunk{chunk}.npz" for source in samples.config["sources"] for chunk in chunks]
+    return samples.files(names)
 
 
 def _training_files(samples: TrackSamples, folders: Mapping[str, str], seed: int) -> dict[str, list[Path]]:

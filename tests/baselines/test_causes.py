@@ -13,10 +13,11 @@ from gpca.causes.settings import GROUPS, DescriptorSettings
 from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.errors import InputError
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module, explainers
+from gpca.reenactment.dataset import FEATURES
 
 GPC = {"learning_rate": 0.1, "iterations": 60, "inducing": 8, "draws": 50}
 FAST = {
-    **dict.fromkeys(("gpca", "gpca_pair", "gpca_multilabel"), GPC),
+    **dict.fromkeys(("gpca", "gpca_pair", "gpca_multilabel", "gpca_further"), GPC),
     "gpca_pair_dgcnn": {"iterations": 20, "inducing": 8, "draws": 50, "points": 32, "draw_points": 16, "epochs": 1},
     "pair_forest": {"trees": 10},
     "pair_boosting": {"iterations": 3},
@@ -25,7 +26,7 @@ FAST |= {name: FAST["gpca"] for name in explainers(CAUSES) if name.startswith("g
 FAST |= {name: FAST["pair_forest"] for name in explainers(CAUSES) if name.startswith("trees_on_")}
 FAST |= {f"{name}_clouds": settings for name, settings in FAST.items()}
 # Each is made of three of the others, and slow.
-COMMITTEES = {"pair_committee", "pair_committee_clouds", "reenact_committee"}
+COMMITTEES = {"committee_further", "pair_committee", "pair_committee_clouds", "reenact_committee"}
 NAMES = sorted(set(explainers(CAUSES)) - COMMITTEES)
 
 
@@ -40,7 +41,10 @@ def seen(causes):
         embedding[registrations.concept == label, i] += 3
     read = {"embedding": embedding, "head_logits": embedding[:, :4], **descriptors.groups}
     exponentials = np.exp(embedding[:, :4])
-    read |= {"verdict": exponentials / exponentials.sum(axis=1, keepdims=True), "reenactment": embedding}
+    read |= {
+        "verdict": exponentials / exponentials.sum(axis=1, keepdims=True),
+        "reenactment": embedding[:, np.arange(len(FEATURES)) % 6],
+    }
     off = np.column_stack([causes.error_shown, np.full(len(causes), 0.2)])  # were the truth or a pose far off true
     read |= {"result_error": off, "weight": np.tile([0.7, 0.3], (len(causes), 1))}
     registrations = replace(registrations, attached={**registrations.attached, **read})

@@ -1,9 +1,12 @@
 """Intervals over draws, of shares, means and paired differences."""
 
+from statistics import NormalDist
+
 import numpy as np
 import pytest
 
-from baselines import untrained
+from baselines import trivial, untrained
+from baselines.untrained import CAUSE_EXPLAINERS as CAUSES_OF
 from gpca.evaluation import intervals
 from gpca.evaluation.intervals import (
     interval,
@@ -113,20 +116,21 @@ WEIGHTS = np.vstack([np.ones(N), intervals.pigeonhole_weights(np.random.default_
 VALUES = {name: intervals.weighted_mean(right_N, WEIGHTS) for name, right_N in RIGHT.items()}
 
 
-def test_the_best_untrained_one_is_beaten_by_a_paired_difference():
+def test_the_best_trivial_one_is_beaten_by_a_paired_difference():
     assert VALUES["good"].shape == (1 + intervals.REPEATS,)
     assert VALUES["good"][0] == RIGHT["good"].mean()
     assert VALUES["good"][1:].std() > 0
-    assert intervals.UNTRAINED == tuple(untrained.EXPLAINERS) == tuple(untrained.CAUSE_EXPLAINERS)
+    for entries, more in ((untrained.EXPLAINERS, trivial.EXPLAINERS), (CAUSES_OF, trivial.CAUSE_EXPLAINERS)):
+        assert {*intervals.TRIVIAL} - {"density"} == {*entries, *more}
     assert (
-        intervals.best_of(VALUES, intervals.UNTRAINED) == "rule"
-        and intervals.best_of(VALUES, intervals.UNTRAINED, least_is_best=True) == "chance"
+        intervals.best_of(VALUES, intervals.TRIVIAL) == "rule"
+        and intervals.best_of(VALUES, intervals.TRIVIAL, least_is_best=True) == "chance"
     )
     value, low, high = interval(VALUES["good"] - VALUES["rule"], difference=True)
     assert 0 < low < value < high
     assert value == pytest.approx(RIGHT["good"].mean() - RIGHT["rule"].mean())
     alone = {"good": VALUES["good"], "rule": np.full(1 + intervals.REPEATS, np.nan)}
-    assert intervals.best_of(alone, intervals.UNTRAINED) == ""
+    assert intervals.best_of(alone, intervals.TRIVIAL) == ""
 
 
 def test_ranks_and_the_factors_of_student_are_those_of_scipy_stats():
@@ -137,3 +141,20 @@ def test_ranks_and_the_factors_of_student_are_those_of_scipy_stats():
         assert np.array_equal(mean_ranks(values_N), stats.rankdata(values_N), equal_nan=True)
     for repeats in range(1, 30):
         assert np.array_equal(student_factor(repeats), stats.t.ppf(0.975, repeats - 1), equal_nan=True)
+
+
+def test_differences_are_corrected_for_being_picked_and_show_nothing_with_few_clusters():
+    value, half, many = np.array([9.0, 2.1, 2.0, np.nan, 0.5]), 2.0, np.full(5, 10**6)
+    low, high = intervals.corrected(value, value - half, value + half, many)
+    usual = NormalDist().inv_cdf(0.975)
+    # The clear one is tested at a fourth of the level, the others at a third, at which the next is not shown.
+    factors = [NormalDist().inv_cdf(1 - 0.025 / m) / usual for m in (4, 3, 3, 3)]
+    measured = [0, 1, 2, 4]
+    assert (high - value)[measured] == pytest.approx(half * np.array(factors), rel=1e-4)
+    assert low[0] > 0 > low[1] and np.isnan(low[3]) and np.isnan(high[3])
+    alone, _ = intervals.corrected(value, value - half, value + half, many, picked=False)
+    assert alone[1] > 0  # not picked from several
+    few, most = intervals.corrected(value, value - half, value + half, np.array([4, 5, 5, 5, 5]))
+    assert few[0] == 0 and most[0] > high[0]
+    ten, _ = intervals.corrected(value[:1], value[:1] - half, value[:1] + half, np.array([10]))
+    assert value[0] - ten[0] == pytest.approx(half * 2.2622 / usual, rel=1e-4)

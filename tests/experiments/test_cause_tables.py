@@ -36,7 +36,7 @@ def rows(source, method, rival, **values):
         records.append((*keys, "", "", *counts, value, value - 0.1, value + 0.05))
         if rival:
             records += [
-                (*keys, kind, other, *counts, *APART) for kind, other in (("rival", rival), ("untrained", "rule"))
+                (*keys, kind, other, *counts, *APART) for kind, other in (("rival", rival), ("trivial", "rule"))
             ]
     return records
 

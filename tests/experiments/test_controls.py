@@ -94,12 +94,12 @@ def test_what_an_explainer_adds_is_that_of_the_same_control_and_draws(files, tmp
         write_csv(path, pd.concat([known, *guesses]))
     rows = rows_of(files, tmp_path / "control_intervals.csv")
     density = rows.loc["density", "a", "all", "gpca", "accuracy"]
-    gain, lead = density.loc["untrained"], density.loc["rival"]
+    gain, lead = density.loc["trivial"], density.loc["rival"]
     assert (gain["other"], lead["other"]) == ("rule", "rule")
     assert gain["value"] == lead["value"] == pytest.approx(0.3)
     assert 0 < gain["low"] <= 0.3 <= gain["high"]
     rule = rows.loc["paper", POOLED, "all", "rule", "accuracy"]
-    assert "untrained" not in rule.index and rule.loc["rival", "other"] == "head"
+    assert "trivial" not in rule.index and rule.loc["rival", "other"] == "head"
     assert rule.loc["rival", "value"] == pytest.approx(-0.6)
     assert rows.loc[("paper", "a", "all", "rule", "icp_calls", ""), "value"] == 4
     assert ("density", "a", "all", "rule", "icp_calls", "") not in rows.index

@@ -95,12 +95,12 @@ def test_of_two_explainers_the_better_leads_by_what_the_other_lacks():
 def test_the_gain_is_over_the_best_that_needs_no_training():
     good, poor, guess = (random_judged(200, skill=skill) for skill in (2.0, 0.3, 0.0))
     rows = compared(good=good, rule=poor, chance=guess, **{CEILING: good})
-    gain = rows.loc["good", "untrained"]
+    gain = rows.loc["good", "trivial"]
     assert gain["other"] == "rule"
     assert gain["value"] == pytest.approx(rows.loc["good", ""]["value"] - rows.loc["rule", ""]["value"])
     assert 0 < gain["low"] < gain["value"] < gain["high"]
-    assert [rows.loc[name, "untrained"]["other"] for name in ("rule", "chance")] == ["chance", "rule"]
-    assert (CEILING, "untrained") not in rows.index
+    assert [rows.loc[name, "trivial"]["other"] for name in ("rule", "chance")] == ["chance", "rule"]
+    assert (CEILING, "trivial") not in rows.index
 
 
 def test_a_run_is_collected_written_and_read(causes, tmp_path):

@@ -13,7 +13,7 @@ from gpca.io.csv_file import write_csv
 
 def run(**sources):
     entries = {name: {"title": title, "kind": "procedural"} for name, title in sources.items()}
-    return Run({"learning_curve": {"sources": list(sources)}, "sources": entries})
+    return Run({"sources": entries})
 
 
 def test_curves_are_collected_as_means_over_the_orders_and_drawn(tmp_path, same_bytes):

@@ -60,7 +60,7 @@ def folder(tmp_path):
     ):
         keys = f"causes,pooled,{method},balanced_accuracy,all"
         lines.append(f"{keys},,,1,9,90,{value},{value - 0.05},{value + 0.05}")
-        lines += [f"{keys},untrained,{gain}"] if gain else []
+        lines += [f"{keys},trivial,{gain}"] if gain else []
     lines += [
         f"causes,pooled,{method},regret,all,,,1,9,60,{value},0.0,1.0"
         for method, value in (("rule", 0.6), ("pair", 0.25))
@@ -84,7 +84,7 @@ def test_findings_of_causes_and_of_recovery_stand_apart(folder):
     assert len(texts) == 3
     for words in ("70 % (95 % interval 65 to 75 %): GP-CA on the pair", "GP-CA (aligned source) has 50 %", "90 %"):
         assert words in texts[0]
-    assert "The best untrained rival, Rule and gate, is 30 points behind (20 to 40)." in texts[0]
+    assert "The best trivial rival, Rule and gate, is 30 points behind (20 to 40)." in texts[0]
     for words in ("25 % of the error", "GP-CA on the pair", "the untrained rule leaves 60 %"):
         assert words in texts[1]
     for words in ("70 % of the failed", "3 actions", "random actions 40 %"):

@@ -53,7 +53,7 @@ LISTS = {  # which names of a step are lists, and not of one seed, file or name
     "frame_labels": "backbones embeddings strategies out",
     "gradients": "seeds registrations encoders embeddings deletions tcav",
     "kernel_grid": "seeds registrations embeddings out predictions",
-    "learning_curve": "samples",
+    "learning_curve": "causes descriptors samples",
     "live_shap": "seeds registrations outcomes out",
     "oracles": "predictions",
     "new_concepts": "encoders encoders_of strategies out",

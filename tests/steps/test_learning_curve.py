@@ -11,14 +11,13 @@ from gpca.causes.descriptors import describe_all
 from gpca.causes.drawing import draw_further
 from gpca.causes.judged import CEILING
 from gpca.causes.settings import CauseSettings, DescriptorSettings
+from gpca.causes.training import QUICK, LabeledSamples
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.steps.learning_curve import (
     CURVE_COLUMNS,
-    GROUPS,
     LEARNERS,
     CurveSettings,
-    LabeledSamples,
     describe,
     labeled_samples,
     learning_curve,
@@ -39,7 +38,7 @@ def further(four):
 def samples(causes, further):
     icp = ICPSettings()
     described = describe(causes, icp)
-    labeled = causes.rows("train")[np.isin(described.label[causes.rows("train")], LABELS)]
+    labeled = causes.rows("train")[np.isin(described.concept[causes.rows("train")], LABELS)]
     more = describe(further, icp)
     pool = LabeledSamples.joined([described.subset(labeled), more, more])  # enough for the sizes
     return pool, described.subset(causes.rows("test"))
@@ -50,11 +49,11 @@ def curve(samples, causes):
     return learning_curve(*samples, causes.subset(causes.rows("test")), SETTINGS, "four", 100)
 
 
-def test_further_samples_are_labeled_of_training_objects_and_new(causes, further):
+def test_further_samples_are_labeled_of_all_objects_and_new(causes, further):
     names = causes.registrations.object_name
-    assert set(further.registrations.object_name) <= set(names[causes.rows("train")])
+    assert set(further.registrations.object_name) <= set(names) > set(names[causes.rows("train")])
     assert set(further.registrations.split) == {"train"} and not len(further.truth_again)
-    assert np.isin(describe(further, ICPSettings()).label, LABELS).all()
+    assert np.isin(describe(further, ICPSettings()).concept, LABELS).all()
     assert not set(further.registrations.severity_noise[further.applied[:, 0]]) & set(
         causes.registrations.severity_noise
     )
@@ -71,7 +70,7 @@ def test_cheap_descriptors_are_those_of_the_explainers(causes):
         causes, "four", 100, DescriptorSettings(starts=1, restarts=1, icp_points=64), ICPSettings()
     )
     own = describe(causes, ICPSettings())
-    for name in GROUPS:
+    for name in QUICK:
         assert np.array_equal(getattr(own, name), described.groups[name])
 
 
@@ -84,19 +83,22 @@ def test_every_learner_has_a_row_of_each_size_and_order_beside_the_truth(curve):
 
 def test_more_samples_than_there_are_cannot_be_learned_from(samples, causes):
     pool, tested = samples
-    with pytest.raises(InputError, match="are fewer than the largest size, 24; raise"):
-        learning_curve(pool.subset(np.arange(20)), tested, causes.subset(causes.rows("test")), SETTINGS, "four", 100)
+    truth = causes.subset(causes.rows("test"))
+    fewer = learning_curve(pool.subset(np.arange(20)), tested, truth, SETTINGS, "four", 100)
+    assert set(fewer["samples"]) == {0, 20}
+    with pytest.raises(InputError, match="are fewer than the least size, 20; raise"):
+        learning_curve(pool.subset(np.arange(19)), tested, truth, SETTINGS, "four", 100)
 
 
 def test_samples_survive_the_file(samples, tmp_path):
     pool, _ = samples
     pool.save(tmp_path / "chunk0.npz", ("four", 100))
     read = LabeledSamples.load(tmp_path / "chunk0.npz", ("four", 100))
-    assert np.array_equal(read.features, pool.features) and read.label.tolist() == pool.label.tolist()
+    assert np.array_equal(read.features, pool.features) and read.concept.tolist() == pool.concept.tolist()
     with pytest.raises(InputError, match="of source 'four'"):
         LabeledSamples.load(tmp_path / "chunk0.npz", ("five", 100))
-    replace(pool, label=np.full(len(pool), "dust")).save(tmp_path / "chunk0.npz", ("four", 100))
-    with pytest.raises(InputError, match="unknown label 'dust'"):
+    replace(pool, concept=np.full(len(pool), "dust")).save(tmp_path / "chunk0.npz", ("four", 100))
+    with pytest.raises(InputError, match="unknown concept 'dust'"):
         LabeledSamples.load(tmp_path / "chunk0.npz", ("four", 100))
 
 

@@ -11,6 +11,7 @@ from gpca.evaluation.measures import POOLED
 from gpca.experiments.diagnosis import collect
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.tracks.leaderboard import MARK, as_text, table_of
+from gpca.tracks.overall import areas, overall, ranks
 from gpca.tracks.published import Method, Rows
 from gpca.tracks.scoring import groups_of, score
 from gpca.tracks.track import TRACKS
@@ -107,3 +108,20 @@ def test_more_starts_of_the_same_instances_make_no_interval_narrower(shipped):
         frames = replace(shipped, track=TRACKS["frames"], rows=rows, methods=methods)
         tables.append(score(frames, {})[0].drop(columns="samples"))
     pd.testing.assert_frame_equal(*tables)
+
+
+def test_methods_that_are_not_shown_to_be_worse_share_a_rank():
+    draws = np.random.default_rng(0).normal(size=501)
+    draws[0] = 0
+    values = {"best": 0.1 + 0.01 * draws, "alike": 0.105 + 0.01 * draws[::-1], "worse": 0.3 + 0.01 * draws}
+    values["alike"][0] = 0.105
+    assert ranks(values) == {"best": 1, "alike": 1, "worse": 3}
+
+
+def test_the_score_of_all_tracks_is_the_risk_of_answers_that_are_not_held_back(shipped):
+    found = areas(shipped, {})
+    knows, guesses = found["rule"][0], found["chance"][0]
+    assert knows == 0 < guesses < 0.5  # a wrong answer to every sample is held back half of the time
+    board = overall([(shipped, {})])
+    assert [cells[0]["text"] for _, cells in board["rows"]] == [method.title for method in shipped.methods[::-1]]
+    assert board["rows"][0][1][1]["text"] == "1"
