@@ -1,14 +1,13 @@
-"""Steps of the readings: what a group reads, encoders that learn from other severities or see other clouds."""
+"""Steps of the readings: what a group reads, and encoders that learn from other severities."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
 
 from gpca.declarations.step import Plan, Step
-from gpca.encoders.registry import encoder_module
 from gpca.experiments.active_learning import learning_settings
 from gpca.experiments.explained import explainer_settings
 from gpca.explainers.registry import explainer_module
-from gpca.frames.source import REAL_WORLD, VIRTUAL
+from gpca.frames.source import REAL_WORLD
 from gpca.steps.readings import groups
 
 
@@ -20,17 +19,6 @@ def retrained_on(config: Mapping, severities: str) -> dict[str, Any]:
 
 def _files(plan: Plan, name: str) -> dict[str, list[str]]:
     config, group, readings = plan.config, groups.GROUPS[name], plan.config["readings"]
-    if name == groups.FRAME_INPUT:
-        backbone, seeds = plan.names["clouded_backbone"], config["seeds"][: readings["frame_seeds"]]
-        return {
-            "registrations": [f"registrations/{REAL_WORLD}/seed{seed}.npz" for seed in seeds],
-            "predictions": [f"predictions/{REAL_WORLD}/{backbone}-none/seed{seed}.csv" for seed in seeds],
-            "embeddings": [
-                f"other_clouds/{REAL_WORLD}/{backbone}/{cloud}/seed{seed}.npz"
-                for cloud in plan.names["cloud"]
-                for seed in seeds
-            ],
-        }
     if name in (groups.FRAME_ENCODER, groups.FRAME_START):
         backbones, published = plan.names["backbone"], plan.names["published"]
         methods_of = {REAL_WORLD: [*backbones, *published]}
@@ -151,75 +139,4 @@ RETRAIN = Step(
     },
     modules=lambda plan: [plan.encoder_module],
     priority=10,
-)
-
-
-def _pretrained_on(plan: Plan) -> list[str]:
-    return [*plan.names["source"], *([VIRTUAL] if plan.config["real_world"]["virtual"] else [])]
-
-
-def _other_cloud(**declared: Any) -> Step:
-    """A step of the encoder of other clouds, whose settings have the changes of its pretraining, or of its training."""
-
-    def settings(plan: Plan, wildcards: Any) -> dict[str, Any]:
-        backbone, frames = plan.names["clouded_backbone"], plan.config["real_world"]
-        pretrains = declared["name"].startswith("pretrain")
-        changes = frames["pretraining"] if pretrains else (frames["training"] or {}).get(backbone)
-        icp = {"icp": plan.config["registrations"]["icp"]}
-        return plan.config["encoders"][backbone] | (changes or {}) | icp | {"reading": wildcards.cloud}
-
-    def modules(plan: Plan) -> list[str]:
-        return [encoder_module(plan.config["encoders"][plan.names["clouded_backbone"]])]
-
-    given: dict[str, Any] = {"params": {"source": REAL_WORLD}, "priority": 11} | declared
-    return Step(**given, settings=settings, modules=modules)
-
-
-PRETRAIN = _other_cloud(
-    name="pretrain_on_other_cloud",
-    run="gpca.steps.pairs:train",
-    inputs={
-        "registrations": lambda plan, wildcards: [
-            f"registrations/{source}/seed{{first_seed}}.npz" for source in _pretrained_on(plan)
-        ]
-    },
-    outputs={
-        "weights": "other_clouds/pretrained/{clouded_backbone}/{cloud}.pt",
-        "curve": "other_clouds/pretrained/{clouded_backbone}/{cloud}.csv",
-    },
-    params={
-        "source": "pretraining",
-        "seed": lambda plan, wildcards: plan.config["seeds"][0],
-        "registrations_of": lambda plan, wildcards: _pretrained_on(plan),
-    },
-    priority=12,  # the longest jobs, with many cores to be started early
-    resources={"mem_mb": 3000, "runtime": 180},
-)
-TRAIN = _other_cloud(
-    name="train_on_other_cloud",
-    run="gpca.steps.pairs:train",
-    inputs={
-        "start": lambda plan, wildcards: (
-            PRETRAIN.outputs["weights"] if plan.config["real_world"]["pretraining"] else []
-        ),
-        "registrations": "registrations/{frames}/seed{seed}.npz",
-        "poses": "poses/{frames}/seed{seed}.csv",
-    },
-    outputs={
-        "weights": "other_clouds/{frames}/{clouded_backbone}/{cloud}/seed{seed}.pt",
-        "curve": "other_clouds/{frames}/{clouded_backbone}/{cloud}/seed{seed}.csv",
-    },
-)
-EMBED = _other_cloud(
-    name="embed_other_cloud",
-    run="gpca.steps.pairs:embed",
-    inputs={
-        "registrations": "registrations/{frames}/seed{seed}.npz",
-        "registration_timings": "timings/{frames}/icp/seed{seed}.csv",
-        "encoder": "other_clouds/{frames}/{clouded_backbone}/{cloud}/seed{seed}.pt",
-    },
-    outputs={
-        "embeddings": "other_clouds/{frames}/{clouded_backbone}/{cloud}/seed{seed}.npz",
-        "timings": "timings/{frames}/{clouded_backbone}_{cloud}/seed{seed}.csv",
-    },
 )

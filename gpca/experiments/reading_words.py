@@ -61,11 +61,6 @@ WORDS = {  # field of a group's choices -> what its values are called
         "samples": "classifier and training samples vary",
     },
     "objects": {"all": "all objects", "seen": "seen objects", "unseen": "unseen objects"},
-    "input": {
-        "aligned": "cloud aligned by ICP",
-        "observed": "cloud before ICP",
-        "reversed": "ICP from the model to the cloud",
-    },
     "architecture": {"judged": "judged encoder", "published": "encoder as published"},
     "initial_pose": {"true_pose": "ICP from near the true pose", "estimated": "ICP from estimators' poses"},
     "features": {

@@ -14,22 +14,19 @@ from gpca.declarations.experiment import Experiment, Names, Tidy
 from gpca.declarations.plan import Run
 from gpca.declarations.result import Figure, Frame, figure, table
 from gpca.errors import InputError
-from gpca.evaluation.measures import ALL
 from gpca.experiments import reading_words
-from gpca.experiments.frames import encoder_title, frames_of, title_of_frames
+from gpca.experiments.frames import frames_of
 from gpca.frames.source import REAL_WORLD, conditions_of
 from gpca.objects.entry import stand_in_clause
-from gpca.pairs.perturbation import CONCEPTS, Severities
-from gpca.reporting.tables.builder import TableBuilder, crossed, interval_over
-from gpca.reporting.tables.cells import cell_of_repeats, plain_cell, rows_where
+from gpca.pairs.perturbation import Severities
+from gpca.reporting.tables.builder import TableBuilder
+from gpca.reporting.tables.cells import plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
-from gpca.reporting.words import plural
-from gpca.settings import Bounds, Keys
+from gpca.settings import Keys
 from gpca.steps.readings import groups
-from gpca.steps.readings.groups import FRAME_INPUT, FRAME_REPEATS, GROUPS, OtherSeverities, ReadingSizes
+from gpca.steps.readings.groups import FRAME_REPEATS, GROUPS, OtherSeverities, ReadingSizes
 
 RANGES = get_args(OtherSeverities)
-SAMPLES = "test_samples"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,12 +34,9 @@ class Section(ReadingSizes):
     """The choices that the paper leaves unstated, by group, and how much of the data the readings see.
 
     Attributes:
-        frame_seeds: number of the run's seeds, from the first, for which encoders that see other clouds of depth
-            frames are trained.
         severities: ranges that encoders learn from instead of the protocol's, for as many seeds as `encoders`.
     """
 
-    frame_seeds: Annotated[int, Bounds(minimum=0)]
     severities: Annotated[dict, Keys(dict.fromkeys(RANGES, Severities), required=RANGES)]
     groups: Annotated[dict, Keys({name: group.values for name, group in GROUPS.items()})]
 
@@ -52,7 +46,6 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
     readings, frames = config["readings"], config["real_world"]
     estimated = [name for name, entry in conditions_of(config).items() if entry.get("form") == "results"]
     readable = {
-        FRAME_INPUT: readings["frame_seeds"] and "none" in frames["reductions"],
         groups.FRAME_ENCODER: frames["published"],
         groups.FRAME_START: estimated and frames["condition_backbones"],
         groups.SEVERITIES_RETRAINED: readings["encoders"],
@@ -65,12 +58,9 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
     return {
         "reading_group": run,
         "whole_group": [name for name in readings["groups"] if name != FRAME_REPEATS],
-        "frame_input": [name for name in run if name == FRAME_INPUT],
         "estimated": f"{REAL_WORLD}_{estimated[0]}" if estimated else "",
         "repeats": list(values_of(FRAME_REPEATS).get("repeats", [])),
         "repeated_backbone": list(frames["backbones"]),
-        "clouded_backbone": frames["backbones"][0],  # whose encoder sees other clouds
-        "cloud": [name for name in values_of(FRAME_INPUT).get("input", []) if name != groups.ALIGNED],
     }
 
 
@@ -104,59 +94,6 @@ def plain_cells(values: Mapping[str, float], seeds: float) -> dict[str, Cell | N
 
 def stand_ins(run: Run) -> str:
     return stand_in_clause([*run.sources.values(), frames_of(run.config)])
-
-
-INPUTS = {
-    "aligned": "observed cloud, aligned by ICP",
-    "observed": "observed cloud before ICP",
-    "reversed": "observed cloud, ICP from the model to it",
-}
-OBJECTS = {"all": "All (%)", "seen": "Seen objects (%)", "unseen": "Unseen objects (%)"}
-CONFUSED = {"pose": "overlap", "overlap": "pose"}
-
-
-@table(
-    "IV-D Ablation studies",
-    "Depth frames: what the encoder sees",
-    """The first backbone of Table VI once more, trained anew on other clouds: the observed one before ICP, and aligned
-    by ICP the other way round. The paper has the encoder see the aligned source.""",
-    metrics="readings/frame_input.csv",
-    needs=("frame_input",),
-)
-def table6_inputs(run: Run, metrics: Frame) -> Table:
-    def share(rows: Frame, metric: str, concept: str = ALL, is_count: bool = False) -> Cell | None:
-        """Mean of a metric over the seeds, in percent of the test samples where it is a count."""
-        rows = rows_where(rows, concept=concept).sort_values("seed")
-        value_R, samples_R = (rows_where(rows, metric=name)["value"].to_numpy(float) for name in (metric, SAMPLES))
-        return cell_of_repeats(100 * (np.divide(value_R, samples_R) if is_count else value_R), int(samples_R.sum()))
-
-    methods = {method: encoder_title(*method.split("-")) for method in metrics["method"].unique()}
-    table = TableBuilder("table6_inputs", {"backbone": "Backbone", "input": "The encoder sees"})
-    for (method, cloud), labels in crossed(methods, INPUTS):
-        rows = {name: rows_where(metrics, table=f"{FRAME_INPUT}/{cloud}/{name}", method=method) for name in OBJECTS}
-        cells = {name: share(subset, "accuracy") for name, subset in rows.items()}
-        cells |= {concept: share(rows["all"], "accuracy", concept) for concept in CONCEPTS}
-        for one, other in CONFUSED.items():
-            cells[f"{one}_as_{other}"] = share(rows["all"], f"predicted_as_{other}", one, is_count=True)
-        table.add_row(labels, cells)
-    table.compare_down(OBJECTS, same=1)
-    titles = {concept: f"{concept.capitalize()} (%)" for concept in CONCEPTS}
-    titles |= {f"{one}_as_{other}": f"{one.capitalize()} taken for {other} (%)" for one, other in CONFUSED.items()}
-    columns = {name: Column(head) for name, head in OBJECTS.items()}
-    counts = [f"{name} {table.cells[0, name].test_samples}" for name in OBJECTS if (0, name) in table.cells]
-    seeds = table.most_seeds()
-    return table.build(
-        caption=f"Accuracy (%) on {title_of_frames(run.config)} by the cloud that the encoder sees",
-        column_head="samples",
-        columns=columns | {name: Column(title, interval=False) for name, title in titles.items()},
-        footnotes=(
-            f"Mean over {plural(seeds, 'seed')}, the first of the run; {interval_over(seeds)}. Test samples: "
-            f"{', '.join(counts)}. The share of seen objects differs from seed to seed, so that All need not lie "
-            "between Seen and Unseen.",
-            "Each cloud has an encoder of its own, pretrained and trained as that of the first row, which is Table "
-            "VI's, on the same samples.",
-        ),
-    )
 
 
 SECTION = "What the paper leaves unstated"

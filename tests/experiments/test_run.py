@@ -40,9 +40,7 @@ def test_every_place_that_the_registry_names_is_there(config, sources):
 
 
 def test_a_reader_of_one_file_is_given_one_and_a_reader_of_many_a_list(config, sources):
-    other = deepcopy(config)
-    other["readings"]["frame_seeds"] = 2
-    names = names_of(other, sources)
+    names = names_of(config, sources)
     for result in results_of(names):
         files = result.files(names)
         for given in result.inputs:
@@ -70,17 +68,6 @@ def test_a_grid_without_any_printed_row_has_no_table4_kernels(config, sources, c
     made = {result.name for result in results_of(names_of(other, sources))}
     assert "table4_kernels" not in made
     assert "table4_grid" in made
-
-
-def test_encoders_of_other_clouds_are_trained_where_the_config_gives_them_seeds(config, sources):
-    other = deepcopy(config)
-    other["readings"]["frame_seeds"] = 2
-    other["real_world"]["backbones"] = ["dgcnn"]
-    made, more = ({result.name for result in results_of(names_of(of, sources))} for of in (config, other))
-    assert more - made == {"table6_inputs"}
-    assert not made - more
-    assert "frame_input" not in names_of(config, sources)["reading_group"]
-    assert "frame_input" in names_of(other, sources)["reading_group"]
 
 
 def test_the_rows_of_table_6_are_gp_ca_on_their_own_embeddings(config, sources):

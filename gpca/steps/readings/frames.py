@@ -1,8 +1,7 @@
-"""Table VI under other readings: what varies between repeats, the cloud that the encoder sees, and other rows.
+"""Table VI under other readings: what varies between repeats, and other rows.
 
-The run trains encoders that see other clouds as that of the protocol, pretrained on all sources and then on the frames
-of each seed. It has the predictions of encoders as published and of ICP from estimators' poses
-(``real_world.published`` and ``conditions`` of the config).
+The run has the predictions of encoders as published and of ICP from estimators' poses (``real_world.published`` and
+``conditions`` of the config).
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -11,15 +10,13 @@ import numpy as np
 
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
-from gpca.errors import InputError
 from gpca.evaluation.measures import ALL
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
 from gpca.seeds import generator
-from gpca.steps.readings.files import Row, RunFiles, accuracies_of_named, train_and_test
-from gpca.steps.readings.gpc_start import gpc_scores
-from gpca.steps.readings.groups import ALIGNED, Reading
+from gpca.steps.readings.files import Row, RunFiles, accuracies_of_named
+from gpca.steps.readings.groups import Reading
 
 
 def repeats(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
@@ -45,27 +42,6 @@ def repeats(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
                     gpc.fit(samples.embedding[rows], samples.concept[rows])
                     named_S = _named(gpc.attribute(samples.embedding[samples.rows("test")])[0])
                 yield from _rows(wanted, samples, named_S, source, method, seed)
-
-
-def inputs(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
-    """Accuracies of the backbone whose predictions are given, by the cloud that its encoder sees.
-
-    Of the embeddings, ``{backbone}-{cloud}`` are those of its encoder that sees another cloud.
-    """
-    for source, method, seed in run_files.predictions:
-        samples = Registrations.load(run_files.registrations[source, seed], (source, seed))
-        for cloud in dict.fromkeys(reading["input"] for reading in readings):
-            embedded = f"{method.split('-')[0]}-{cloud}"
-            if cloud == ALIGNED:
-                named_S = run_files.predicted(source, method, seed)
-            elif (source, embedded, seed) in run_files.embeddings:
-                train, test = train_and_test(run_files.embedded(source, embedded, seed))
-                named_S = _named(gpc_scores(run_files.section("gpca"), train, test.embedding, source, seed))
-            else:
-                fault = f"lack embeddings {embedded} of {source}, seed {seed}"
-                raise InputError("readings of frame_input", fault, "give them")
-            wanted = [reading for reading in readings if reading["input"] == cloud]
-            yield from _rows(wanted, samples, named_S, source, method, seed)
 
 
 def other_rows(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:

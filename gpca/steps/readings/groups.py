@@ -9,15 +9,12 @@ from itertools import product
 from typing import Annotated, Any, Literal
 
 from gpca.classifier.settings import Kernel, LearningRate
-from gpca.pairs.synthesis import Reading as ReadAs
 from gpca.process.registry import load
 from gpca.settings import Bounds, Count, Distinct, Keys, OpenShare, Positive
 
 FRAME_REPEATS = "frames"  # the group that fits classifiers to depth frames anew
-FRAME_INPUT = "frame_input"  # the group whose encoders of frames see other clouds
 FRAME_ENCODER, FRAME_START = "frame_encoder", "frame_start"  # those that read other rows on frames than the judged
 SEVERITIES_RETRAINED = "severities_retrained"  # the group whose encoders learn from other severities
-ALIGNED = "aligned"  # the cloud that the encoder sees in the protocol, as ICP left it
 ALL_SOURCES = ("coffee_cup", "linemod", "ycb")
 AboveOne = Annotated[float, Bounds(exclusiveMinimum=1)]
 AtLeastTwo = Annotated[int, Bounds(minimum=2)]
@@ -212,13 +209,6 @@ GROUPS = {
         "What varies on depth frames",
         {"repeats": Literal["everything", "classifiers", "samples"], "objects": ShownObjects},
         "frames:repeats",
-        ("registrations", "predictions", "embeddings"),
-        (),
-    ),
-    FRAME_INPUT: Group(
-        "What the encoder sees on depth frames",
-        {"input": ReadAs, "objects": ShownObjects},
-        "frames:inputs",
         ("registrations", "predictions", "embeddings"),
         (),
     ),

@@ -11,7 +11,6 @@ from gpca.attribution.predictions import write_predictions
 from gpca.classifier.gpc import GPC
 from gpca.classifier.scores import Attribution
 from gpca.classifier.settings import GPCSettings
-from gpca.errors import InputError
 from gpca.explainers.registry import explainer_entry
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.steps.readings import frames, gpc_start, labels, learners, severities
@@ -177,23 +176,6 @@ def test_features_are_chosen_by_name(run_files):
     counts = {reading[0]: v for (reading, _, _, concept), v in found.items() if concept == "overlap"}
     assert counts["counts"] == 1  # a cropped cloud has fewer points
     assert counts["residual"] < 1
-
-
-def test_frames_are_named_from_the_embeddings_of_each_cloud(run_files):
-    [embeddings] = run_files.embeddings.values()
-    [predictions] = run_files.predictions.values()
-    shown = replace(
-        run_files,
-        predictions={("tiny", "dgcnn-none", 0): predictions},
-        embeddings={("tiny", "dgcnn-observed", 0): embeddings},
-    )
-    choices = {"input": ["aligned", "observed"], "objects": ["all", "unseen"]}
-    found = rows_of(frames.inputs, shown, choices)
-    assert found[("aligned", "all"), "dgcnn-none", "accuracy", "all"] == pytest.approx(15 / 18)
-    assert found[("observed", "all"), "dgcnn-none", "accuracy", "all"] > 0.9
-    assert {reading for reading, *_ in found} == {(cloud, "all") for cloud in choices["input"]}
-    with pytest.raises(InputError, match="lack embeddings dgcnn-reversed of tiny, seed 0"):
-        rows_of(frames.inputs, shown, {"input": ["reversed"], "objects": ["all"]})
 
 
 def test_the_cold_classifier_of_the_labels_is_the_protocols(run_files):
