@@ -24,6 +24,17 @@ from gpca.reporting.registry import SUFFIXES, by_section
 TEMPLATES = Path(__file__).parent / "templates"
 KEY_FIGURES = ("causes_example", "fig2_overview")  # the first of these that the run has opens the page
 VERDICTS = "verdicts"  # the figure above the comparison
+# What stands below the comparison with the paper, and in the groups after it: title -> names, whatever their section.
+PAPER = (
+    *("table1_single_baselines", "table2_per_concept", "table3_active_learning", "table4_kernels", "table5_compact"),
+    *("table6_backbones", "table7_runtime", "claims"),
+)
+GROUPS = {
+    "Causes": ("table9_causes", "failures", "loophole", "table10_controls", "table9_shift", "guarantee"),
+    "Scans": ("table18_scan_causes", "scan_failures", "table17_scans", "table9_frames", "fig5_real_world_example"),
+    "Repair and recovery": ("table20_repair", "table11_registration", "table8_recovery", "recovery_rates"),
+}
+REST = "Everything else"
 DOCS = "../../docs"  # from the folder of a run in a checkout, results/{run}
 FEWEST = 2  # mean number of rows with the same first label from which they form a group
 _CSS_PIXELS = 170 / 300  # CSS pixels of a figure's pixel at 300 dpi, so that its letters are as large as the text's
@@ -74,25 +85,29 @@ def write_page(folder: str | Path, run: FinishedRun) -> None:
         raise InputError(folder, f"lacks {', '.join(missing)}", f"make them with '{run.command}'")
     shown = {result.name: result for result in run.results}
     links = Links(folder, shown)
-    sections = {
-        section: [_content(folder, result, run, links) for result in results]
-        for section, results in by_section(run.results).items()
-    }
+    content = {name: _content(folder, result, run, links) for name, result in shown.items()}
+    groups = {title: [content[name] for name in names if name in content] for title, names in GROUPS.items()}
+    grouped = {*PAPER, *(name for names in GROUPS.values() for name in names)}
+    rest = [result for result in run.results if result.name not in grouped]
+    sections = {section: [content[result.name] for result in results] for section, results in by_section(rest).items()}
     key_figure = next((shown[name] for name in KEY_FIGURES if name in shown), None)
     suffix = {"tables": "csv", "figures": "pdf"}
     recorded = [folder / f"{result.kind}/{result.name}.{suffix[result.kind]}" for result in run.results]
     icp = run.config.get("registrations", {}).get("icp", {})
     settings = CauseSettings.from_dict(dict(run.config["causes"]), icp)
     reach, samples = ICPSettings(**icp).correspondence_distance, []
+    for source, files in run.causes.items():  # failures first
+        samples += cause_samples(files, run.sources[source], settings)
     for source, files in run.samples.items():
         samples += page_samples(files, run.sources[source], settings.limits, reach)
-    for source, files in run.causes.items():
-        samples += cause_samples(files, run.sources[source], settings)
     text = render(
         run=run,
         findings=findings_of(folder, run.titles, shown),
-        key_figure=key_figure and _content(folder, key_figure, run, links),
-        verdict_map=_content(folder, shown[VERDICTS], run, links) if VERDICTS in shown else None,
+        key_figure=key_figure and content[key_figure.name],
+        verdict_map=content.get(VERDICTS),
+        paper=[content[name] for name in PAPER if name in content],
+        groups={title: results for title, results in groups.items() if results},
+        rest=REST,
         sections=sections,
         comparison=page_comparison(folder / "comparison.csv", run.reference),
         links=links,
@@ -159,7 +174,8 @@ def _content(folder: Path, result: Shown, run: FinishedRun, links: Links) -> dic
     common = {"name": result.name, "title": title, "caption": caption}
     if result.kind == "tables":
         printed = json.loads((folder / f"tables/{result.name}.json").read_text(encoding="utf-8"))
-        return common | {"table": in_groups(printed)}
+        part = printed.get("short", printed)
+        return common | {"table": in_groups(part), "whole": in_groups(printed) if part is not printed else None}
     with Image.open(folder / f"figures/{result.name}.png") as image:
         width, height = image.size
     return common | {"table": None, "width": round(width * _CSS_PIXELS), "height": round(height * _CSS_PIXELS)}

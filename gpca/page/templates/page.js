@@ -144,7 +144,20 @@ function showRegistrations() {
   show();
 }
 
+// What a link leads to may be folded.
+function unfold() {
+  const target = document.getElementById(decodeURIComponent(location.hash.slice(1)));
+  for (let box = target; box; box = box.parentElement) {
+    if (box.tagName === "DETAILS") box.open = true;
+  }
+  const within = target && target.querySelector(":scope > details");
+  if (within && target.tagName === "SECTION") within.open = true;
+  if (target) target.scrollIntoView();
+}
+
 document.addEventListener("DOMContentLoaded", () => {
+  window.addEventListener("hashchange", unfold);
+  if (location.hash) unfold();
   if (document.getElementById("comparison-table")) {
     filterComparison();
   }

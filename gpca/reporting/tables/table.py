@@ -1,20 +1,27 @@
-"""Writes a table as CSV for machines, Markdown for readers, LaTeX for the paper and JSON for the page."""
+"""Writes a table as CSV for machines, Markdown for readers, LaTeX for the paper and JSON for the page.
+
+Readers get pooled rows, the best first and trivial ones last, if the whole does not fit a page.
+"""
 
 import csv
 import json
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import Any
 
+from gpca.evaluation.intervals import UNTRAINED
+from gpca.evaluation.measures import POOLED
 from gpca.io.files import whole_file, write_text
 
 EMPTY = "–"  # where there is no number
 LEAST_SEEDS = 3  # A mean over fewer has no interval: that of two spans everything, however near they lie.
 SHARE = (0.0, 100.0)  # limits of a share in percent
+MOST_COLUMNS, MOST_ROWS = 6, 15  # of a table for readers
+SIGHT, PAPERS = "reads", "gpca"  # label of what an explainer sees, for which there is no space; a row that always stays
 _COLUMN_CHARACTERS, _TEXT_CHARACTERS = 50, 100  # fill one column of a two-column paper, and both
 _SCALED_DOWN = r"\resizebox{\ifdim\width>\textwidth\textwidth\else\width\fi}{!}{%"
 
@@ -93,9 +100,15 @@ class Table:
         return best
 
     def write(self, stem: str | Path) -> None:
-        """Write ``{stem}.csv``, ``.md``, ``.tex`` and, for the page, ``.json``: each whole or not at all."""
-        page = json.dumps(self.printed(), indent=1, ensure_ascii=False) + "\n"
-        for suffix, text in (("md", self.markdown()), ("tex", self.latex()), ("json", page)):
+        """Write ``{stem}.csv``, ``.md``, ``.tex`` and, for the page, ``.json``: each whole or not at all.
+
+        Markdown has the part that readers need (:func:`short`), JSON both.
+        """
+        part = short(self)
+        words = left_out(self, part)
+        both = self.printed() | ({"short": part.printed() | {"left_out": words}} if words else {})
+        page = json.dumps(both, indent=1, ensure_ascii=False) + "\n"
+        for suffix, text in (("md", part.markdown(words)), ("tex", self.latex()), ("json", page)):
             write_text(f"{stem}.{suffix}", text)
         with whole_file(f"{stem}.csv") as partial, partial.open("w", newline="", encoding="utf-8") as file:
             csv.writer(file, lineterminator="\n").writerows(self.records())
@@ -115,7 +128,7 @@ class Table:
                 shown.append((" ".join(texts) or EMPTY, (row, name) in best))
             rows.append(shown)
         return {
-            "caption": self.caption,
+            "caption": self.numbered_caption,
             "heads": [*self.row_heads.values(), *(column.title for column in main.values())],
             "label_columns": len(self.row_heads),
             "rows": rows,
@@ -138,13 +151,20 @@ class Table:
             records.append((*(key for key, _ in labels), name, round(cell.mean, 6), low, high, *counts))
         return records
 
-    def markdown(self) -> str:
-        """Return a GitHub table, caption above, footnotes below."""
+    @property
+    def numbered_caption(self) -> str:
+        """The caption behind the table's number, if it has one: ``Table IX: …``."""
+        numbered = re.match(r"table(\d+)_", self.name)
+        return f"Table {_roman(int(numbered[1]))}: {self.caption}" if numbered else self.caption
+
+    def markdown(self, note: str = "") -> str:
+        """Return a GitHub table, caption above, footnotes below, first `note`."""
         printed = self.printed()
         rule = [":--" if number < len(self.row_heads) else "--:" for number in range(len(printed["heads"]))]
         body = _body(printed, lambda text: text.replace("|", "\\|"), "**{}**")
         table = "\n".join(f"| {' | '.join(row)} |" for row in (printed["heads"], rule, *body))
-        return "\n\n".join([f"**{self.caption}**", table, *self.footnotes]) + "\n"
+        notes = [note, *self.footnotes] if note else self.footnotes
+        return "\n\n".join([f"**{self.numbered_caption}**", table, *notes]) + "\n"
 
     def latex(self) -> str:
         r"""Return a floating table; it needs ``\usepackage{booktabs}`` and spans both columns when it is wide.
@@ -179,6 +199,84 @@ class Table:
                 "",
             ]
         )
+
+
+def short(table: Table) -> Table:
+    """Return the table itself where it is small, or mostly text; else at most so many columns and rows of it.
+
+    Rows over all sources are kept alone, if there are any. Those that compete in the first compared column are sorted
+    by it, and the others follow: untrained rows, oracles.
+    """
+    if len(table.row_heads) >= len(_main(table)) or (
+        len(table.rows) <= MOST_ROWS and len(table.row_heads) + len(_main(table)) <= MOST_COLUMNS
+    ):
+        return table
+    score = next((key for group in table.compared for _, key in group if len({row for row, _ in group}) > 1), "")
+    rows = [row for row, labels in enumerate(table.rows) if POOLED in dict(labels)] or list(range(len(table.rows)))
+    rows = list(_best_rows(table, rows, score))
+    heads = list(table.row_heads)
+    shown = [place for place in range(len(heads)) if len({table.rows[row][place] for row in rows}) > 1]
+    shown = [place for place in shown if heads[place] != SIGHT] or [len(heads) - 1]
+    main = sorted(_main(table), key=lambda key: key != score)[: MOST_COLUMNS - len(shown)]
+    columns = {key: column for key, column in table.columns.items() if key in main or column.beside in main}
+    places = {row: place for place, row in enumerate(rows)}
+    cells = {(places[row], key): cell for (row, key), cell in table.cells.items() if row in places and key in columns}
+    return replace(
+        table,
+        row_heads={heads[place]: table.row_heads[heads[place]] for place in shown},
+        rows=tuple(tuple(table.rows[row][place] for place in shown) for row in rows),
+        columns={key: columns[key] for key in (*main, *(key for key in columns if key not in main))},
+        cells=cells,
+        compared=tuple([(places[row], key) for row, key in group if row in places] for group in table.compared),
+    )
+
+
+def left_out(whole: Table, part: Table) -> str:
+    """Return what the part lacks, in words for readers; empty if nothing."""
+    if part is whole:
+        return ""
+    counts = (len(part.rows), len(whole.rows), len(_main(part)), len(_main(whole)))
+    return "{} of {} rows and {} of {} columns of numbers; {}.csv has all.".format(*counts, whole.name)
+
+
+def _main(table: Table) -> list[str]:
+    return [key for key, column in table.columns.items() if not column.beside]
+
+
+def _best_rows(table: Table, rows: Sequence[int], score: str) -> Iterator[int]:
+    """Yield at most `MOST_ROWS` rows: of each group that competes in a column the best, and the paper's; then others.
+
+    Where several groups compete, such as datasets, the best of the others follows each.
+    """
+
+    def names(row: int) -> set[str]:
+        return {key for key, _ in table.rows[row]}
+
+    def worth(row: int) -> float:
+        cell = table.cells.get((row, score))
+        return -math.inf if cell is None else cell.mean * (-1 if table.columns[score].least_is_best else 1)
+
+    groups = [[row for row, key in group if key == score and row in rows] for group in table.compared]
+    groups = [rivals for group in groups if (rivals := [row for row in group if not names(row) & set(UNTRAINED)])]
+    others = [row for row in rows if not any(row in group for group in groups)]
+    if not groups:
+        yield from others[:MOST_ROWS]
+        return
+    others.sort(key=lambda row: bool(names(row) & set(UNTRAINED)))
+    beside = others[: MOST_ROWS // 3] if len(groups) == 1 else []
+    each = max(1, (MOST_ROWS - len(beside)) // len(groups) - (len(groups) > 1 and bool(others)))
+    for group in groups[:MOST_ROWS]:
+        best = sorted(group, key=lambda row: (PAPERS not in names(row), -worth(row)))[:each]
+        yield from sorted(best, key=worth, reverse=True)
+        if len(groups) > 1:
+            yield from sorted([row for row in others if table.rows[row][0] == table.rows[group[0]][0]], key=worth)[-1:]
+    yield from beside
+
+
+def _roman(number: int) -> str:
+    """Return a number below 40 as the paper writes those of its tables."""
+    tens, ones = divmod(number, 10)
+    return "X" * tens + ("", "I", "II", "III", "IV", "V", "VI", "VII", "VIII", "IX")[ones]
 
 
 def _body(printed: Mapping[str, Any], escape: Callable[[str], str], bold: str) -> list[list[str]]:
