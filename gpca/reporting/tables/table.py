@@ -13,7 +13,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from gpca.evaluation.intervals import UNTRAINED
+from gpca.evaluation.intervals import TRIVIAL
 from gpca.evaluation.measures import POOLED
 from gpca.io.files import whole_file, write_text
 
@@ -219,15 +219,15 @@ def short(table: Table) -> Table:
     shown = [place for place in shown if heads[place] != SIGHT] or [len(heads) - 1]
     main = sorted(_main(table), key=lambda key: key != score)[: MOST_COLUMNS - len(shown)]
     columns = {key: column for key, column in table.columns.items() if key in main or column.beside in main}
-    places = {row: place for place, row in enumerate(rows)}
-    cells = {(places[row], key): cell for (row, key), cell in table.cells.items() if row in places and key in columns}
+    order = {row: place for place, row in enumerate(rows)}
+    cells = {(order[row], key): cell for (row, key), cell in table.cells.items() if row in order and key in columns}
     return replace(
         table,
         row_heads={heads[place]: table.row_heads[heads[place]] for place in shown},
         rows=tuple(tuple(table.rows[row][place] for place in shown) for row in rows),
         columns={key: columns[key] for key in (*main, *(key for key in columns if key not in main))},
         cells=cells,
-        compared=tuple([(places[row], key) for row, key in group if row in places] for group in table.compared),
+        compared=tuple([(order[row], key) for row, key in group if row in order] for group in table.compared),
     )
 
 
@@ -257,12 +257,12 @@ def _best_rows(table: Table, rows: Sequence[int], score: str) -> Iterator[int]:
         return -math.inf if cell is None else cell.mean * (-1 if table.columns[score].least_is_best else 1)
 
     groups = [[row for row, key in group if key == score and row in rows] for group in table.compared]
-    groups = [rivals for group in groups if (rivals := [row for row in group if not names(row) & set(UNTRAINED)])]
+    groups = [rivals for group in groups if (rivals := [row for row in group if not names(row) & set(TRIVIAL)])]
     others = [row for row in rows if not any(row in group for group in groups)]
     if not groups:
         yield from others[:MOST_ROWS]
         return
-    others.sort(key=lambda row: bool(names(row) & set(UNTRAINED)))
+    others.sort(key=lambda row: bool(names(row) & set(TRIVIAL)))
     beside = others[: MOST_ROWS // 3] if len(groups) == 1 else []
     each = max(1, (MOST_ROWS - len(beside)) // len(groups) - (len(groups) > 1 and bool(others)))
     for group in groups[:MOST_ROWS]:
