@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,8 +54,13 @@ def standardized_regression(inverse_regularisation: float):
     return make_pipeline(StandardScaler(), LogisticRegression(C=inverse_regularisation, max_iter=1000))
 
 
-def boosted_trees(*axes: object, iterations: int = 150, learning_rate: float = 0.06):
-    """Return unfitted gradient boosting on histograms (Ke et al. 2017); the axes name its random numbers."""
+def boosted_trees(
+    *axes: object, iterations: int = 150, learning_rate: float = 0.06, monotonic: Sequence[int] | None = None
+):
+    """Return unfitted gradient boosting on histograms (Ke et al. 2017); the axes name its random numbers.
+
+    Where the features have signs, the probability rises or falls with those of a sign that is not 0.
+    """
     from sklearn.ensemble import HistGradientBoostingClassifier
 
     return HistGradientBoostingClassifier(
@@ -64,6 +70,7 @@ def boosted_trees(*axes: object, iterations: int = 150, learning_rate: float = 0
         l2_regularization=1.0,
         max_features=0.3,
         early_stopping=False,
+        monotonic_cst=monotonic,
         random_state=seed_of(*axes, "boosted trees") % 2**32,
     )
 
@@ -82,11 +89,13 @@ class BoostedQuestion:
     right: np.ndarray  # (n,) right child; a leaf itself at a leaf
 
     @classmethod
-    def fit(cls, inputs_N_F: np.ndarray, yes_N: np.ndarray, *axes: object) -> BoostedQuestion:
-        """Learn from samples (N, F) and their answers; the axes name the random numbers."""
+    def fit(
+        cls, inputs_N_F: np.ndarray, yes_N: np.ndarray, *axes: object, monotonic: Sequence[int] | None = None
+    ) -> BoostedQuestion:
+        """Learn from samples (N, F) and their answers; see :func:`boosted_trees`."""
         if yes_N.all() or not yes_N.any():  # a single class: smoothed odds without trees
             return cls(float(np.log((yes_N.sum() + 1) / ((~yes_N).sum() + 1))), *_joined([]))
-        fitted = boosted_trees(*axes).fit(inputs_N_F, yes_N)
+        fitted = boosted_trees(*axes, monotonic=monotonic).fit(inputs_N_F, yes_N)
         trees = [predictor.nodes for (predictor,) in fitted._predictors]
         return cls(float(fitted._baseline_prediction[0, 0]), *_joined(trees))
 
@@ -94,13 +103,17 @@ class BoostedQuestion:
         """Return the probability of yes (N,)."""
         from scipy.special import expit
 
+        return expit(self.log_odds(inputs_N_F))
+
+    def log_odds(self, inputs_N_F: np.ndarray) -> np.ndarray:
+        """Return the logarithm of the odds of yes (N,)."""
         at_N_T = np.repeat(self.roots[None], len(inputs_N_F), axis=0)
         while (inner_N_T := self.feature[at_N_T] != LEAF).any():
             rows, columns = np.nonzero(inner_N_T)
             nodes = at_N_T[rows, columns]
             left = inputs_N_F[rows, self.feature[nodes]] <= self.number[nodes]
             at_N_T[rows, columns] = np.where(left, nodes + 1, self.right[nodes])
-        return expit(self.baseline + self.number[at_N_T].sum(axis=1))
+        return self.baseline + self.number[at_N_T].sum(axis=1)
 
     def state(self) -> dict[str, object]:
         """Return numbers and arrays for :meth:`from_state`."""

@@ -15,7 +15,6 @@ from typing import get_args
 import numpy as np
 
 from gpca.alignment.icp import ICPSettings
-from gpca.causes.descriptors import WIDTHS
 from gpca.causes.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
 from gpca.causes.settings import Moved
 from gpca.causes.truth import FAILED, NOMINAL
@@ -33,16 +32,16 @@ from gpca.model import torch_file
 from gpca.model.clouds import MEASURES, Familiarity
 from gpca.model.diagnoser import READS, Diagnoser, upgraded
 from gpca.model.location import REMEDY, require_model
-from gpca.model.result import ERROR, PROBABILITY
+from gpca.model.result import ERROR, OF_TREES, PROBABILITY
 from gpca.objects.canonical import FEWEST_CLOUD_POINTS
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reenactment.dataset import DESCRIBED, FEATURES
+from gpca.reenactment.dataset import DESCRIPTORS, FEATURES
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import read_settings
 from gpca.uncertainty.settings import FEWEST_STARTS, UncertaintySettings
 
 FORMAT, VERSION = "GP-CA model", 6
-FEATURE_COUNT = len(FEATURES) + sum(WIDTHS[group] for group in DESCRIBED)  # of a diagnoser
+FEATURE_COUNT = len(FEATURES) + DESCRIPTORS  # of a diagnoser
 ASYMMETRY = 1e-9  # of a covariance, whose prior is the identity
 # Upper bounds on the work of one explanation. A score is a mean over the draws of the classifier, so that a million
 # draws leave an error of at most 0.0005.
@@ -209,6 +208,8 @@ def _require_diagnoser(state: Mapping) -> None:
     _require(type(usual) is float and 0 < usual < MOST_DRAWS, f"usual_distance: {usual!r} is not a distance")
     for name, numbers in (("weights", PROBABILITY), ("error_weights", ERROR)):
         _require_shape(name, judge[name], (len(numbers) + 1,))
+    if judge.get("trees") is not None:
+        require_trees(judge["trees"], len(OF_TREES) + DESCRIPTORS)
     _require(levels and isinstance(levels, list), "no tolerance is calibrated")
     for level in levels:
         tolerance = level["tolerance"]

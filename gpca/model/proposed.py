@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -123,11 +123,14 @@ def joined(proposals: Sequence[Proposals], errors: Sequence[np.ndarray], family_
     return Proposed(error, weight, distance, hypothesis, rmse, fitness, np.asarray(family_N))
 
 
-def with_repair(levels: Sequence[Calibrated], proposed: Proposed) -> tuple[Calibrated, ...]:
+def with_repair(
+    levels: Sequence[Calibrated], proposed: Proposed, result_N_of: Mapping[float, np.ndarray] | None = None
+) -> tuple[Calibrated, ...]:
     """Return the levels with the probability below which a pose is called repaired.
 
     The samples are registrations that are called failed, by judges that learned from other families, and the proposal
-    for each that is most probably right; of those called repaired, few are off (`accepted_below`).
+    for each that is most probably right; of those called repaired, few are off (`accepted_below`). Registered poses
+    are judged by the results (N,) at each tolerance, if there are any.
     """
     probability_L_N_P = np.zeros((len(levels), *proposed.error_N_P.shape))
     for seen, unseen in proposed.folds():
@@ -135,7 +138,8 @@ def with_repair(levels: Sequence[Calibrated], proposed: Proposed) -> tuple[Calib
         probability_L_N_P[:, unseen] = [asked.probabilities(judge, level.tolerance) for level in levels]
     calibrated = []
     for level, probability_N_P in zip(levels, probability_L_N_P, strict=True):
-        called = np.flatnonzero(probability_N_P[:, 0] >= level.threshold)
+        result_N = probability_N_P[:, 0] if result_N_of is None else result_N_of[level.tolerance]
+        called = np.flatnonzero(result_N >= level.threshold)
         best_n = 1 + probability_N_P[called, 1:].argmin(axis=1)
         off_n = proposed.error_N_P[called, best_n] > level.tolerance
         below = accepted_below(probability_N_P[called, best_n], off_n, proposed.family_N[called])

@@ -190,18 +190,27 @@ def search(pair: ObservedPair, settings: ReenactmentSettings, surface: ModelSurf
 
 
 def decide(
-    judge: ResultJudge, level: Calibrated, proposals: Proposals, tolerance: float, lost: bool = False
+    judge: ResultJudge,
+    level: Calibrated,
+    proposals: Proposals,
+    tolerance: float,
+    lost: bool = False,
+    described_F: np.ndarray | None = None,
 ) -> Verdict:
     """Return the verdict: a pose that is not called failed stays, another takes its place only if it is called good.
 
     If none is called good, the fewest most probable poses of which one is right are given, if they are called good so.
-    A lost registration, which ended away from the target, never stays.
+    A lost registration, which ended away from the target, never stays. Descriptors are those of the registration, if
+    there was one.
     """
 
     def of_set(rows: list[int]) -> float:
         return float(judge.probability(proposals.set_of(rows), tolerance)[0])
 
     probability_n = judge.probability(proposals.evidence, tolerance)
+    if described_F is not None:
+        registered = proposals.evidence.subset(np.array([0]))
+        probability_n[:1] = judge.probability(registered, tolerance, described_F[None])
     failed_from = 0.0 if lost else level.threshold
     return verdict_of(probability_n, proposals.weight_n, failed_from, level.good_below, of_set)
 

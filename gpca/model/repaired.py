@@ -42,6 +42,7 @@ from gpca.model.scene import Scene
 from gpca.model.undetermined import Undetermined, undetermined_at
 from gpca.numerals import in_decimals
 from gpca.objects.canonical import CanonicalFrame
+from gpca.reenactment.dataset import described
 from gpca.reenactment.enactment import Enactment
 from gpca.reenactment.hypotheses import weights_of
 from gpca.reenactment.registration import pose_posterior
@@ -170,7 +171,8 @@ class Repair(ExplainedRegistration):
         proposals = propose(clouds.source, surface, T, *hypotheses, refine, measure)
         proposals.evidence.fitness_N[0], proposals.evidence.inlier_rmse_N[0] = pair.fitness_n[0], pair.inlier_rmse_n[0]
         level = calibrated_at(diagnoser.levels, tolerance)
-        verdict = decide(diagnoser.judge, level, proposals, tolerance, lost)
+        described_F = None if method == GIVEN else described(pair, diagnoser.runs.icp)
+        verdict = decide(diagnoser.judge, level, proposals, tolerance, lost, described_F)
         errors_n = diagnoser.judge.error(proposals.evidence)
         poses = [pose.outside(frame, T_init) for pose in other_poses(proposals, verdict, errors_n, surface)]
         T_best = proposals.T_n[verdict.row or 1]

@@ -1,17 +1,20 @@
 """The probability that one pose is off by more than a tolerance, from a re-enactment's hypotheses of the true pose.
 
 It is a logistic regression on a few numbers that are relative to the tolerance, so that any tolerance may be asked for.
+Where a registration ended at the pose, boosted trees on descriptors of the pair have a say, too: they know how far it
+moved, which a pose that is given, or takes the place of another, does not tell.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.special import expit, logit
 
 from gpca.causes.truth import LARGEST_ERROR
+from gpca.explainers.classifiers import BoostedQuestion, standardized_regression
 from gpca.guarantee.guarantee import Guarantee
 from gpca.io.container import Container, array
 from gpca.reenactment.settings import STEEPNESS
@@ -24,6 +27,7 @@ EVEN = 0.5  # threshold of a judge without calibration
 # Rows of weights; the last number of each is the constant.
 PROBABILITY = ("apart", "mean_distance", "first_distance", "inlier_rmse", "fitness", "tolerance")
 ERROR = PROBABILITY[1:5]
+OF_TREES = {"log_odds": 1, "log_tolerance": -1}  # what trees read before the descriptors; the probability rises, falls
 ROUNDED = 1 + 1e-9  # a tolerance may have been a length
 REGULARIZATION = 0.3  # scikit-learn's C, on standardized numbers
 
@@ -58,6 +62,7 @@ class ResultJudge:
 
     weights: np.ndarray  # (7,) of `PROBABILITY` in log odds, the constant last
     error_weights: np.ndarray  # (5,) of `ERROR` in ln error (diameters), the constant last
+    trees: BoostedQuestion | None = None  # on `OF_TREES` and descriptors of registrations
 
     @classmethod
     def untrained(cls) -> ResultJudge:
@@ -65,11 +70,9 @@ class ResultJudge:
         return cls(np.eye(7)[0], np.eye(5)[0])
 
     @classmethod
-    def fit(cls, evidence: Evidence, error_N: np.ndarray) -> ResultJudge:
-        """Learn from poses with known errors (diameters), at all `TOLERANCES`."""
+    def fit(cls, evidence: Evidence, error_N: np.ndarray, described_N_F: np.ndarray | None = None) -> ResultJudge:
+        """Learn from poses with known errors (diameters) and, of registrations, descriptors, at all `TOLERANCES`."""
         from sklearn.linear_model import Ridge
-
-        from gpca.explainers.classifiers import standardized_regression
 
         numbers = np.concatenate([evidence.numbers(tolerance) for tolerance in TOLERANCES])
         off = np.concatenate([error_N > tolerance for tolerance in TOLERANCES])
@@ -79,11 +82,41 @@ class ResultJudge:
         slopes = regression.coef_[0] / scaler.scale_
         weights = np.append(slopes, regression.intercept_ - slopes @ scaler.mean_)
         error = Ridge(alpha=1.0).fit(evidence.numbers(1.0)[:, 1:5], np.log(np.maximum(error_N, SMALLEST)))
-        return cls(weights, np.append(error.coef_, error.intercept_))
+        judge = cls(weights, np.append(error.coef_, error.intercept_))
+        if described_N_F is None:
+            return judge
+        inputs = [judge._inputs(judge._log_odds(evidence, each), each, described_N_F) for each in TOLERANCES]
+        signs = [*OF_TREES.values(), *[0] * described_N_F.shape[1]]
+        return replace(judge, trees=BoostedQuestion.fit(np.concatenate(inputs), off, "result", monotonic=signs))
 
-    def probability(self, evidence: Evidence, tolerance: float) -> np.ndarray:
-        """Return the probabilities (N,) that the poses are off by more than the tolerance (diameters)."""
-        return expit(evidence.numbers(tolerance) @ self.weights[:-1] + self.weights[-1])
+    def probability(self, evidence: Evidence, tolerance: float, described_N_F: np.ndarray | None = None) -> np.ndarray:
+        """Return the probabilities (N,) that the poses are off by more than the tolerance (diameters).
+
+        With descriptors, registrations ended there, of which the trees know more.
+        """
+        log_odds_N = self._log_odds(evidence, tolerance)
+        if self.trees is not None and described_N_F is not None:
+            log_odds_N = (log_odds_N + self.trees.log_odds(self._inputs(log_odds_N, tolerance, described_N_F))) / 2
+        return expit(log_odds_N)
+
+    def _log_odds(self, evidence: Evidence, tolerance: float) -> np.ndarray:
+        return evidence.numbers(tolerance) @ self.weights[:-1] + self.weights[-1]
+
+    @staticmethod
+    def _inputs(log_odds_N: np.ndarray, tolerance: float, described_N_F: np.ndarray) -> np.ndarray:
+        tolerance_N = np.full(len(log_odds_N), np.log(tolerance))
+        return np.column_stack([log_odds_N, tolerance_N, np.nan_to_num(described_N_F)])
+
+    def state(self) -> dict[str, object]:
+        """Return arrays and trees for :meth:`from_state`."""
+        trees = {"trees": self.trees.state()} if self.trees else {}
+        return {"weights": self.weights, "error_weights": self.error_weights, **trees}
+
+    @classmethod
+    def from_state(cls, state: Mapping) -> ResultJudge:
+        """Return the judge of a :meth:`state`; before there were trees, it had none."""
+        trees = state.get("trees")
+        return cls(state["weights"], state["error_weights"], trees and BoostedQuestion.from_state(trees))
 
     def error(self, evidence: Evidence) -> np.ndarray:
         """Return the expected errors (N,), diameters."""

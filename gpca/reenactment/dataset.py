@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.special import expit
 
+from gpca.alignment.icp import ICPSettings
 from gpca.alignment.pose_error import displacements
 from gpca.causes.dataset import LABELS, Causes
 from gpca.causes.descriptors import WIDTHS, describe_plainly, observed_pair
@@ -45,6 +46,7 @@ def verdict(error_S_K_8: np.ndarray, weight_S_K: np.ndarray, limits: Limits) -> 
 
 MEASURED = ("log_likelihood", "width", "covered", "noise", "outliers", "missing", "to_start", "to_result")
 DESCRIBED = ("distances", "planes", "motion", "starts")  # groups of descriptors, without further registrations
+DESCRIPTORS = sum(WIDTHS[group] for group in DESCRIBED)  # number of these, the last of the features
 
 
 # What re-enacts a row where its registration comes from: it finds hypotheses of the true pose of the observed pair and
@@ -72,7 +74,7 @@ class Reenactments(Container):
     uncertainty: np.ndarray = array(f"S K {len(SUBSETS)}")
     result_error: np.ndarray = array("S K")  # of the pose that registration found, were a hypothesis true; diameters
     measured: np.ndarray = array(f"S K {len(MEASURED)}")
-    described: np.ndarray = array(f"S {sum(WIDTHS[group] for group in DESCRIBED)}")
+    described: np.ndarray = array(f"S {DESCRIPTORS}")
     verdict: np.ndarray = array(f"S {len(LABELS)}")
 
     @classmethod
@@ -134,8 +136,13 @@ def row_of(
         "uncertainty": np.array([enactment.uncertainty_8 for enactment in enactments])[rows_K],
         "result_error": np.array(result_error_K)[rows_K],
         "measured": np.array(measured)[rows_K],
-        "described": np.concatenate([*describe_plainly(pair, truth.icp).values()]),
+        "described": described(pair, truth.icp),
     }
+
+
+def described(pair: ObservedPair, icp: ICPSettings) -> np.ndarray:
+    """Return the descriptors (F,) of a pair that need no further registrations."""
+    return np.concatenate([*describe_plainly(pair, icp).values()])
 
 
 SMALLEST_SUM = 0.01  # diameters, of the |φ̂| whose shares are taken

@@ -138,7 +138,7 @@ def model(job: Job) -> None:
             )
             errors = pose_errors(causes, objects)
             proposals.append(proposed_for_all(causes, reenactments, errors, truth.icp, truth.moved))
-        diagnoser, bald_N = learn(
+        diagnoser, bald_N, result_N_of = learn(
             TrainingSet.joined(sets),
             GPCSettings(**section.get("classifier", {})),
             truth,
@@ -146,7 +146,7 @@ def model(job: Job) -> None:
             section.get("false_alarms", 0.05),
             *("model", job.seed),
         )
-        diagnoser = replace(diagnoser, levels=with_repair(diagnoser.levels, Proposed.joined(proposals)))
+        diagnoser = replace(diagnoser, levels=with_repair(diagnoser.levels, Proposed.joined(proposals), result_N_of))
         settings, axes = EncoderSettings(**job.section("encoder")), (job.source, job.seed)
         recovery = job.section("recovery")
         registrations = Registrations.load(job.registrations, axes)

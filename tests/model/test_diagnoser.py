@@ -147,7 +147,7 @@ def learned():
 
 
 def test_failures_are_told_from_what_is_fine_and_the_uncertainty_is_of_unseen_failures(learned):
-    given, (diagnoser, bald_N) = learned
+    given, (diagnoser, bald_N, _) = learned
     assert len(bald_N) == (given.label_N != "nominal").sum()
     new = training_set(30, 1)
     classifier = diagnoser.classifier
@@ -159,7 +159,7 @@ def test_failures_are_told_from_what_is_fine_and_the_uncertainty_is_of_unseen_fa
 
 
 def test_what_is_promised_and_measured_is_of_families_that_were_not_learned(learned):
-    given, (full, _) = learned
+    given, (full, _, result_N_of) = learned
     assert full.held_out["samples"] == 60
     assert full.held_out["families"] == 4
     assert full.held_out["auroc_failed"] == 1
@@ -172,6 +172,7 @@ def test_what_is_promised_and_measured_is_of_families_that_were_not_learned(lear
     judged, result_T_N = judged_unseen(given, SETTINGS, "tiny", 0)
     for level, result_N in zip(full.levels, result_T_N, strict=True):
         assert (level.guarantee.families, level.guarantee.samples) == (0, 60)
+        np.testing.assert_array_equal(result_N_of[level.tolerance], result_N)
         inside = level.guarantee.sets(state_probabilities(judged.causes_N_3, result_N))
         state_N = given.states_within(level.tolerance)
         own = [level.guarantee.state_sets.states.index(state) for state in state_N]
@@ -186,7 +187,7 @@ def test_what_is_promised_and_measured_is_of_families_that_were_not_learned(lear
 def test_nothing_is_promised_at_a_tolerance_that_no_result_keeps(least, tolerances):
     given = training_set(24, 0)
     given = replace(given, shown_error_N=np.maximum(given.shown_error_N, least))
-    made, _ = learn(given, SETTINGS, CauseSettings(), ReenactmentSettings(), 0.05, "tiny", 0)
+    made, *_ = learn(given, SETTINGS, CauseSettings(), ReenactmentSettings(), 0.05, "tiny", 0)
     assert tuple(level.tolerance for level in made.levels if level.guarantee) == tolerances
     assert np.isfinite([*made.held_out.values()]).all()
     assert Diagnoser.from_state(made.state()).at_default == made.at_default

@@ -44,6 +44,22 @@ def test_the_probability_is_that_of_the_errors_at_any_tolerance(judge, tolerance
         assert off_N[inside_N].mean() == pytest.approx(told_N[inside_N].mean(), abs=0.05)
 
 
+def test_descriptors_of_a_registration_tell_what_the_evidence_does_not_and_a_larger_tolerance_is_kept_more_often():
+    random = np.random.default_rng(5)
+    error_N = np.exp(random.uniform(np.log(0.002), np.log(0.4), size=600))
+    blind = evidence_of(random.permutation(error_N))
+    described_N_3 = np.column_stack([error_N, random.normal(size=(600, 2))])
+    told = ResultJudge.fit(blind, error_N, described_N_3)
+    off_N = error_N > 0.03
+    given_N, registered_N = told.probability(blind, 0.03), told.probability(blind, 0.03, described_N_3)
+    assert abs(given_N[off_N].mean() - given_N[~off_N].mean()) < 0.1  # a pose that is given has no descriptors
+    assert registered_N[off_N].mean() > 0.8 > 0.3 > registered_N[~off_N].mean()
+    falling = np.diff([told.probability(blind, each, described_N_3) for each in np.geomspace(0.01, 0.1, 9)], axis=0)
+    assert (falling <= 1e-12).all()
+    again = ResultJudge.from_state(told.state())
+    np.testing.assert_array_equal(again.probability(blind, 0.03, described_N_3), registered_N)
+
+
 def test_without_training_it_is_the_weight_of_poses_apart_from_the_result():
     evidence = Evidence(np.array([[0.001, 0.2]]), np.array([[0.7, 0.3]]), np.array([0.02]), np.array([0.9]))
     assert ResultJudge.untrained().probability(evidence, 0.03) == pytest.approx(0.3, abs=0.002)
