@@ -54,14 +54,17 @@ class Adam:
 
     @torch.no_grad()
     def step(self) -> None:
-        """Update every parameter by its gradient, which each must have."""
+        """Update every parameter that has a gradient."""
+        states = zip(self._parameters, self._means, self._squares, self._steps, strict=True)
+        rows = [(p, p.grad, mean, square, step) for p, mean, square, step in states if p.grad is not None]
+        parameters, gradients, means, squares, steps = map(list, zip(*rows, strict=True))
         adam(
-            self._parameters,
-            [parameter.grad for parameter in self._parameters if parameter.grad is not None],
-            self._means,
-            self._squares,
+            parameters,
+            gradients,
+            means,
+            squares,
             [],
-            self._steps,
+            steps,
             amsgrad=False,
             beta1=self.beta1,
             beta2=0.999,

@@ -53,12 +53,20 @@ def test_scenes_replace_no_folder_but_their_own(folder, out):
 
 @pytest.mark.parametrize(
     ("outputs", "inputs"),
-    [(["a", "b", "a"], []), (["a"], ["a"]), (["a"], ["b", "./c/../a"]), (["a"], ["link"]), (["link"], ["a"])],
+    [
+        (["a", "b", "a"], []),
+        (["a"], ["a"]),
+        (["a"], ["b", "./c/../a"]),
+        (["a"], ["link"]),
+        (["link"], ["a"]),
+        (["hard"], ["a"]),
+    ],
 )
 def test_one_file_is_not_written_twice_nor_over_what_is_read(tmp_path, monkeypatch, outputs, inputs):
     monkeypatch.chdir(tmp_path)
     Path("a").write_text("")
     Path("link").symlink_to("a")
+    os.link("a", "hard")
     with pytest.raises(InputError, match="is also an input or another output; give each file its own name"):
         require_outputs(outputs, inputs)
 
@@ -95,6 +103,21 @@ def test_no_command_writes_over_what_it_reads(tmp_path, monkeypatch, capsys, wor
     assert main(words.split()) == 2
     assert "is also an input or another output" in capsys.readouterr().err
     assert Path("my.py").read_text() == "years of work"
+
+
+@pytest.mark.parametrize("words", ["leaderboard --submissions A --out A/new.csv", "compare A A --out A/new.md"])
+def test_no_page_is_taken_for_a_table(tmp_path, monkeypatch, capsys, words):
+    monkeypatch.chdir(tmp_path)
+    Path("A").mkdir()
+    assert main(words.split()) == 2
+    assert "is the name of no page; let it end in .html" in capsys.readouterr().err
+
+
+def test_a_file_that_is_no_queue_is_refused_at_once(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("notes").write_text("years of work")
+    assert main(["explain", "missing.ply", "missing.ply", "--queue", "notes"]) == 2
+    assert "notes: is not a queue; name another file with --queue" in capsys.readouterr().err
 
 
 def test_a_row_is_added_on_a_line_of_its_own(tmp_path):

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gpca.classifier.kmeans import kmeans_plusplus
-from gpca.errors import require_known
+from gpca.errors import InputError, require_known
+from gpca.io.arrays import require_numbers
 from gpca.process.plugins import joined_outside, module_outside
 
 EXPANSION = 4  # K: BALD with k-means clusters the B·K most uncertain samples
@@ -64,7 +65,10 @@ def select(name: str, pool: Pool, batch: int, random: np.random.Generator) -> np
     wanted = min(batch, len(pool.h_N_d))
     if wanted == len(pool.h_N_d):
         return np.arange(wanted)
-    chosen = np.array(list(dict.fromkeys(map(int, strategy.choose(pool, wanted, random)))), dtype=int)
+    rows = require_numbers(strategy.choose(pool, wanted, random), (None,), f"strategy '{name}': its rows", "iu")
+    if not ((rows >= 0) & (rows < len(pool.h_N_d))).all():
+        raise InputError(f"strategy '{name}'", f"returns rows that a pool of {len(pool.h_N_d)} has not", "correct it")
+    chosen = np.array(list(dict.fromkeys(rows.tolist())), dtype=int)
     others = np.setdiff1d(np.arange(len(pool.h_N_d)), chosen)
     return np.concatenate([chosen, random.permutation(others)])[:wanted]
 

@@ -73,6 +73,11 @@ def is_queue(path: str | Path) -> bool:
         return False
 
 
+def require_queue(path: str | Path) -> None:
+    if not is_queue(path):
+        raise InputError(path, "is not a queue", "name another file with --queue")
+
+
 def add_to_queue(path: str | Path, aligned: np.ndarray, target: np.ndarray, h_1_d: np.ndarray, name: str) -> int:
     """Append a registration to a file, which need not exist, and return the number of registrations in it.
 
@@ -86,8 +91,7 @@ def add_to_queue(path: str | Path, aligned: np.ndarray, target: np.ndarray, h_1_
     )
     with whole_file(path) as partial:  # no other process adds to it meanwhile
         if path.exists():
-            if not is_queue(path):
-                raise InputError(path, "is not a queue", "name another file with --queue")
+            require_queue(path)
             before = Queue.load(path)
             if before.h.shape[1] != one.h.shape[1]:
                 raise InputError(path, "is a queue of another model", "name another file with --queue")

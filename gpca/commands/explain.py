@@ -90,6 +90,10 @@ def run_explain(options: Namespace) -> int:
     rows = from_rows(options) if options.pairs else []
     row_files = [options.pairs.parent / name for _, row in rows for key in FILES if (name := row.get(key))]
     require_apart(options, [*OF_ONE, "queue"], [*filter(None, [path]), *row_files])
+    if options.queue and options.queue.exists():
+        from gpca.active_learning.labeling import require_queue
+
+        require_queue(options.queue)
     inputs = [] if options.pairs else from_words(options)
     read_target = target_reader(options.scans)
     statuses, given = {0}, []

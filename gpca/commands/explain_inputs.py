@@ -1,6 +1,7 @@
 """What ``explain`` reads: sources and a target of the command line, or a CSV of pairs."""
 
 import csv
+import sys
 from argparse import Namespace
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from gpca.errors import InputError, refusing, require_known
-from gpca.io.files import require_file
+from gpca.io.files import printable, require_file
 from gpca.model.clouds import read_points, read_pose, read_target
 from gpca.objects.canonical import CanonicalFrame
 from gpca.objects.sizes import AS_OPTIONS, extent, require_sizes
@@ -19,6 +20,7 @@ from gpca.objects.surface import METERS_PER_UNIT, measured
 
 COLUMNS = ("source", "target")  # of a CSV of pairs; optional ones are init or pose, unit and source_unit
 FILES = (*COLUMNS, "init", "pose")
+USED = (*FILES, "unit", "source_unit", "label", "group")
 TargetReader = Callable[[Path], tuple[np.ndarray, CanonicalFrame | None]]
 PAIRS_REMEDY = "give the columns source and target, and perhaps init or pose, unit and source_unit"
 
@@ -71,7 +73,12 @@ def from_rows(options: Namespace, columns: Sequence[str] = COLUMNS) -> list[tupl
     with refusing(path, "is not a readable CSV file ({})", PAIRS_REMEDY), path.open(encoding="utf-8-sig") as file:
         table = csv.DictReader(file, skipinitialspace=True)
         rows = [(f"{path}, line {table.line_num}", row) for row in table]
-    if missing := [column for column in columns if column not in (table.fieldnames or ())]:
+    names = list(table.fieldnames or ())
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise InputError(path, f"column '{twice[0]}' occurs twice", PAIRS_REMEDY)
+    if unused := [name for name in names if name not in USED]:
+        print(f"{path}: the column '{printable(unused[0])}' is not used", file=sys.stderr)
+    if missing := [column for column in columns if column not in names]:
         raise InputError(path, f"column '{missing[0]}' is missing", PAIRS_REMEDY)
     if not rows:
         raise InputError(path, "has no rows", PAIRS_REMEDY)

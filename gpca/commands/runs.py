@@ -90,7 +90,7 @@ def add_compare_arguments(parser: ArgumentParser) -> None:
 def run_compare(options: Namespace) -> int:
     """Write a page with the tables and figures of two runs, and print how many numbers of each table differ."""
     from gpca.declarations.registry import registered
-    from gpca.io.files import require_apart
+    from gpca.io.files import require_apart, require_page
     from gpca.page.two_runs import ALONE, APART, DIFFERENT, compare_tables, write_comparison
 
     folders = (options.one, options.other)
@@ -98,6 +98,7 @@ def run_compare(options: Namespace) -> int:
         if not folder.is_dir():
             raise InputError(folder, "no such folder", "name the folder of a finished run, such as results/default")
     require_apart(options, ["out"])
+    require_page(options.out)
     titles = {result.name: result.title for result in registered()}
     tables, alone = compare_tables(folders, titles)
     write_comparison(folders, tables, alone, titles, options.out)

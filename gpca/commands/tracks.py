@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from gpca.errors import InputError, require_known
-from gpca.io.files import PAGE, require_apart, require_outputs, write_text
+from gpca.io.files import PAGE, require_apart, require_outputs, require_page, write_text
 from gpca.jobs.arguments import COUNT
 from gpca.tracks import leaderboard
 from gpca.tracks.published import FOLDER, Published
@@ -136,6 +136,7 @@ def run_leaderboard(options: Namespace) -> int:
     page = options.out = options.out or options.submissions / f"index{PAGE}"
     if not options.check:
         require_apart(options, ["out"])
+        require_page(page)
     submissions, faults = leaderboard.read_submissions(options.submissions)
     if faults:
         print(*faults, sep="\n", file=sys.stderr)

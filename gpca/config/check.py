@@ -14,7 +14,8 @@ from gpca.errors import InputError, require_names, with_key
 from gpca.explainers.registry import explainer_entry, require_settings
 from gpca.frames.source import REAL_WORLD
 from gpca.io.structured_text import require_plain
-from gpca.objects.source import require_place, resolve
+from gpca.objects.canonical import read_object_splits, read_scene_splits
+from gpca.objects.source import find_file, require_place, resolve
 from gpca.process.plugins import use
 from gpca.settings import read_settings
 
@@ -60,6 +61,14 @@ def check(config: dict) -> dict[str, dict]:
     layers.check_listed(whole, left_out)
     for experiment in experiments():
         experiment.check(whole, left_out)
+    for key, read_splits, names in (
+        ("objects", read_object_splits, whole["sources"]),
+        ("scenes", read_scene_splits, whole["real_world"]["datasets"] or ()),
+    ):
+        if place := whole["splits"][key]:
+            path = with_key(f"splits.{key}", find_file, place, whole["data_dir"])
+            for name in names:
+                with_key(f"splits.{key}", read_splits, path, name)
     return {
         name: {"stand_in": entry["kind"] == "procedural"}
         | with_key(f"sources.{name}", resolve, entry, whole["data_dir"])

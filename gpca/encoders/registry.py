@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from typing import Annotated, Any, Literal
 
 from gpca.errors import InputError, require_known, with_key
@@ -30,17 +31,31 @@ def encoder_module(settings: Mapping) -> str:
 
 
 def require_backbone(backbone: str) -> None:
-    """Raise an InputError that lists the backbones unless `backbone` is one of them."""
+    """Raise an InputError that lists the backbones unless `backbone` is one of them, and its module is there."""
     require_known("backbone", backbone, encoders())
+    module, colon, _ = encoders()[backbone].partition(":")
+    try:
+        is_there = bool(colon) and (backbone in ENCODERS or find_spec(module) is not None)
+    except (ImportError, ValueError):
+        is_there = False
+    if not is_there:
+        raise InputError(f"backbone '{backbone}'", f"there is no {encoders()[backbone]}", "list it as module:class")
 
 
 def make_encoder(backbone: str, options: dict):
     """Return a new encoder, a module from clouds (B, N, 3) to embeddings (B, ``embedding_size``)."""
     require_backbone(backbone)
     try:
-        return load(encoders()[backbone])(**options)
+        encoder = load(encoders()[backbone])(**options)
     except TypeError as fault:
         raise InputError(f"backbone '{backbone}'", str(fault), "see encoder.options in the config") from fault
+    except AttributeError as fault:
+        raise InputError(f"backbone '{backbone}'", str(fault), "give ENCODERS module:class") from fault
+    size = getattr(encoder, "embedding_size", None)
+    if not hasattr(encoder, "state_dict") or type(size) is not int or size < 1:
+        fault = f"is a {type(encoder).__name__} whose embedding_size is {size!r}"
+        raise InputError(f"backbone '{backbone}'", fault, "make it a module of torch with a whole embedding_size")
+    return encoder
 
 
 def parameter_count(module) -> int:

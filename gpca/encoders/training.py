@@ -19,6 +19,7 @@ from torch import nn
 from gpca.encoders.registry import EncoderSettings, make_encoder
 from gpca.encoders.tensor_file import read_tensors, write_tensors
 from gpca.errors import InputError
+from gpca.io.arrays import require_numbers
 from gpca.io.files import Axes, require_axes, require_file
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
@@ -58,6 +59,22 @@ class Classifier(nn.Sequential):
 
     def __init__(self, encoder: nn.Module, head: nn.Module) -> None:
         super().__init__(OrderedDict(encoder=encoder, head=head))
+
+    def forward(self, clouds: Any) -> torch.Tensor:
+        return self.head(embeddings_by(self.encoder, clouds))
+
+
+def embeddings_by(encoder: Any, clouds: Any) -> torch.Tensor:
+    """Return h (B, d) of a batch; InputError unless the encoder, perhaps one from outside, gives this shape."""
+    h_B_d, count = encoder(clouds), len(clouds)
+    if isinstance(h_B_d, torch.Tensor):
+        count = count if isinstance(clouds, torch.Tensor) else len(h_B_d)  # else of several sizes, by one of the suite
+        words = f"{h_B_d.dtype} of shape {[*h_B_d.shape]}"
+    else:
+        words = f"a {type(h_B_d).__name__}"
+    if words != (wanted := f"torch.float32 of shape {[count, encoder.embedding_size]}"):
+        raise InputError(f"encoder {type(encoder).__name__}", f"returns {words}", f"return {wanted}")
+    return h_B_d
 
 
 def make_model(
@@ -287,7 +304,8 @@ def embed(
     parts = []
     for rows in progress(batches, f"embeddings of {source}, seed {seed}"):
         axes = [(source, seed, "embedding", number) for number in range(settings.draws)]
-        draws = [model.encoder(_drawn(draw, settings, registrations, rows, *names)) for names in axes]
+        draws = [embeddings_by(model.encoder, _drawn(draw, settings, registrations, rows, *names)) for names in axes]
         parts.append(torch.stack(draws).mean(dim=0))
     h_S_d = torch.cat(parts)
-    return h_S_d.cpu().numpy(), model.head(h_S_d).cpu().numpy()
+    h, logits = h_S_d.cpu().numpy(), model.head(h_S_d).cpu().numpy()
+    return require_numbers(h, h.shape, f"encoder {type(model.encoder).__name__}: its embeddings"), logits

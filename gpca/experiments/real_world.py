@@ -15,7 +15,7 @@ from gpca.experiments import frames as frame_rows
 from gpca.explainers.registry import require_settings
 from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.frames.rgbd_scene import SceneSettings
-from gpca.frames.source import ONE_ENCODER, REAL_WORLD, conditions_of, has_estimates, resolve_datasets
+from gpca.frames.source import ONE_ENCODER, REAL_WORLD, conditions_of, has_estimates, require_local, resolve_datasets
 from gpca.objects import procedural
 from gpca.objects.entry import Checksums, Name, Place, Text, Unit, Urls
 from gpca.pairs.synthesis import TestSamples, TrainSamples
@@ -104,6 +104,8 @@ def check(config: dict, left_out: LeftOut) -> None:
     for family in section["scenes"].get("families", ()):
         with_key("real_world.scenes.families", procedural.require_family, family)
     datasets = with_key("real_world.datasets", resolve_datasets, section["datasets"], config["data_dir"])
+    for name, entry in datasets.items():
+        with_key(f"real_world.datasets.{name}", require_local, entry)
     if section["initial_pose"].get("form") == "results" and not has_estimates(datasets):
         fault = "form 'results' needs a dataset with results or errors"
         raise InputError("config key real_world.initial_pose", fault, "name the files or choose another form")

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import TYPE_CHECKING, Literal, Protocol, get_args, runtime_checkable
+from typing import TYPE_CHECKING, Any, Literal, Protocol, get_args, runtime_checkable
 
 import numpy as np
 
@@ -41,6 +41,7 @@ NOTHING = "nothing"
 BARE = "registrations"  # `reads` of an explainer that needs nothing attached
 REENACTED = "reenactments"  # `reads` of an explainer that needs the re-enactments of each pair
 EMBEDDINGS = "embeddings"  # of trained encoders
+READS = (BARE, "descriptors", REENACTED, EMBEDDINGS)
 
 
 class ConceptExplainer(Protocol):
@@ -191,6 +192,16 @@ class ExplainerEntry:
         if not isinstance(self.sees, tuple) or not set(self.sees) <= set(PARTS):
             remedy = f"give a tuple of {', '.join(PARTS)}, or () for {NOTHING}"
             raise InputError(f"explainer '{self.title}'", f"sees {self.sees!r}", remedy)
+        if self.reads not in READS and self.design is None:
+            raise InputError(f"explainer '{self.title}'", f"reads {self.reads!r}", f"give one of {', '.join(READS)}")
+
+    def made(self, *axes: object, **settings: Any) -> ConceptExplainer:
+        """Return a new explainer; InputError for what an entry from outside makes instead."""
+        explainer = self.make(*axes, **settings)
+        if not all(callable(getattr(explainer, name, None)) for name in ("fit", "explain")):
+            fault = f"is a {type(explainer).__name__} without fit or explain"
+            raise InputError(f"explainer '{self.title}'", fault, "make it as docs/adding.md says")
+        return explainer
 
     @property
     def sight(self) -> str:

@@ -63,7 +63,7 @@ def make_rivals(explainers: Mapping[str, Mapping], source: str, seed: int) -> di
 def described_for(rivals: Mapping[str, ExplainerEntry], registrations: Registrations) -> Registrations:
     """Registrations with the explainers' measurements attached, made once for all training sets."""
     for rival in rivals.values():
-        explainer = rival.make()
+        explainer = rival.made()
         if isinstance(explainer, Describing):
             registrations = explainer.describe(registrations)
     return registrations

@@ -135,15 +135,23 @@ class Frame:
         return inside
 
 
-def read_frames(folders: Iterable[Path], split: str = "test") -> list[Frame]:
-    """Return the frames below ``{split}*`` of a dataset's folders, in order of scene and image."""
-    folders = list(folders)
-    scene_files = [path for folder in folders for path in folder.glob(f"**/{split}*/*/scene_gt.json")]
-    if not scene_files:
+def scene_files(folders: Iterable[Path], split: str = "test") -> Iterator[Path]:
+    """Yield the scene_gt.json of each scene below ``{split}*`` of a dataset's folders; InputError if none is there."""
+    folders, path = list(folders), None
+    for folder in folders:
+        for path in folder.glob(f"**/{split}*/*/scene_gt.json"):
+            yield path
+    if path is None:
         fault = f"has no {split}*/<scene>/scene_gt.json"
         raise InputError(", ".join(map(str, folders)), fault, "check location or split")
+
+
+def read_frames(folders: Iterable[Path], split: str = "test") -> list[Frame]:
+    """Return the frames below ``{split}*`` of a dataset's folders, in order of scene and image."""
     frames: dict[tuple[int, int], Frame] = {}
-    for folder in (path.parent for path in scene_files):
+    folders = list(folders)
+    for path in scene_files(folders, split):
+        folder = path.parent
         with refusing(folder, "the name of a scene's folder is not a number", "name it like 000001"):
             scene = whole(folder.name)
         cameras, truths = (read_images(folder / f"scene_{name}.json") for name in ("camera", "gt"))
@@ -166,7 +174,7 @@ def read_frames(folders: Iterable[Path], split: str = "test") -> list[Frame]:
                 both = f"{same.depth} and {frame.depth}"
                 raise InputError(both, "are the same image of the same scene", "set split to the intended folder")
     if not frames:
-        raise InputError(scene_files[0], "lists no image", REMEDY)
+        raise InputError(", ".join(map(str, folders)), "lists no image", REMEDY)
     return sorted(frames.values(), key=lambda frame: frame.place)
 
 
@@ -211,17 +219,27 @@ def _needed_image(folder: Path, stem: str) -> Path:
     return path
 
 
-def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
-    """Yield `views_per_instance` (default 6) views of the `objects` (ids, default all), spread over their frames."""
+def require_entry(entry: dict, folder: Path) -> None:
+    """Raise an InputError unless the folder has frames, in millimeters, of each object that the entry names."""
     if meters_per(entry.get("unit") or "mm") != meters_per("mm"):
         raise InputError(f"unit '{entry['unit']}'", "is not that of BOP frames", "leave unit out")
+    missing = set(listed_objects(entry))
+    for path in scene_files([folder]):
+        annotations = [each for truth in read_images(path).values() if isinstance(truth, list) for each in truth]
+        missing -= {each.get("obj_id") for each in annotations if isinstance(each, dict)}
+        if not missing:
+            return
+    raise InputError(folder, f"no frame shows object {min(missing)}", "check objects in the config")
+
+
+def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
+    """Yield `views_per_instance` (default 6) views of the `objects` (ids, default all), spread over their frames."""
     shown: dict[int, list] = {}
+    require_entry(entry, folder)
     for frame in read_frames([folder]):
         for place, annotation in enumerate(frame.annotations):
             shown.setdefault(annotation.object_id, []).append((frame, place))
     wanted = listed_objects(entry) or sorted(shown)
-    if missing := [number for number in wanted if number not in shown]:
-        raise InputError(folder, f"no frame shows object {missing[0]}", "check objects in the config")
     for number in wanted:
         for frame, place in evenly(shown[number], entry.get("views_per_instance", VIEWS)):
             try:

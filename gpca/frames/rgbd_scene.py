@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -51,6 +52,10 @@ DEPTH_SCALE = 0.1  # millimeters per unit of the depth images
 Distance = Annotated[float, Bounds(minimum=0.2, maximum=10)]  # in meters
 Elevation = Annotated[float, Bounds(minimum=0, maximum=89)]  # in degrees
 DESCRIPTION = "dataset_info.json"
+WRITTEN = re.compile(
+    rf"{DESCRIPTION}|models/(obj_\d{{6}}\.ply|models_info\.json)"
+    r"|test/\d{6}/(scene_(camera|gt|gt_info)\.json|(depth|rgb|mask|mask_visib)/\d{6}(_\d{6})?\.png)"
+)
 TABLE_COLOR = (0.72, 0.65, 0.55)
 
 
@@ -98,8 +103,12 @@ def write_scenes(surfaces: Iterable[Surface], source: str, settings: SceneSettin
     folder = Path(folder)
     if folder.exists() and not folder.is_dir():
         raise InputError(folder, "is not a folder", "choose another name")
-    if folder.is_dir() and any(folder.iterdir()) and not (folder / DESCRIPTION).is_file():
-        raise InputError(folder, "contains files other than scenes, which would be lost", "choose another folder")
+    files = [
+        path.relative_to(folder).as_posix() for path in folder.rglob("*") if not path.is_dir() or path.is_symlink()
+    ]
+    if others := [name for name in files if DESCRIPTION not in files or not WRITTEN.fullmatch(name)]:
+        fault = f"contains files other than scenes, which would be lost, such as {others[0]}"
+        raise InputError(folder, fault, "choose another folder")
     surfaces = [center(surface) for surface in surfaces]
     resting = [stable_poses(surface) for surface in surfaces]
     with whole_folder(folder) as partial:

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from gpca.errors import InputError
+from gpca.frames.bop import scene_files
+from gpca.objects.bop import models_folder
 from gpca.objects.source import data_files, places_of, resolve
 
 REAL_WORLD = "real_rgbd"  # the source that the frames of a run are
@@ -17,8 +19,8 @@ def resolve_datasets(datasets: Mapping[str, dict] | None, data_dir: str | None) 
     for name, entry in (datasets or {}).items():
         if entry.get("optional") and not any(path.is_dir() for path in places_of(entry["location"], data_dir)):
             continue
-        files = patterns(entry.get("split", "test"))
-        of = resolve({"title": name, "kind": "bop", "files": files, **entry}, data_dir)
+        of = resolve({"title": name, "kind": "bop", **entry}, data_dir)
+        of["files"] = patterns(entry.get("split", "test"))
         results = of.get("results") or []
         named = [results] if isinstance(results, str) else results
         of["results"] = [str(path) for pattern in named for path in _matching(data_dir, pattern)]
@@ -32,6 +34,14 @@ def resolve_datasets(datasets: Mapping[str, dict] | None, data_dir: str | None) 
                 raise InputError(path, "no such results file", f"correct results and errors of dataset {name}")
         resolved[name] = of
     return resolved
+
+
+def require_local(entry: Mapping) -> None:
+    """Raise an InputError unless a resolved dataset that needs no download has scenes and, elsewhere, models."""
+    if entry["origin"] == "local":
+        next(scene_files([Path(entry["location"])], entry.get("split", "test")))
+        if entry.get("models"):
+            models_folder(Path(entry["models"]))
 
 
 def has_estimates(datasets: Mapping[str, dict]) -> bool:

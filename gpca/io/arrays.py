@@ -101,13 +101,13 @@ def require_numbers(
     """
     wanted = "×".join("N" if size is None else str(size) for size in shape)
     fault = ""
-    if not isinstance(values, np.ndarray):
+    if not isinstance(values, np.ndarray) or isinstance(values, np.matrix | np.ma.MaskedArray):
         fault = f"is of type {type(values).__name__}, not an array of NumPy"
     elif values.dtype.kind not in kinds or values.dtype.itemsize > max(_FLOAT_BYTES):
         fault = f"has type {values.dtype}"
     elif values.ndim != len(shape) or any(b not in (a, None) for a, b in zip(values.shape, shape, strict=True)):
         fault = f"has shape {'×'.join(map(str, values.shape)) or 'scalar'}, not {wanted}"
-    elif finite and not (np.abs(values) <= LARGEST_NUMBER).all():
+    elif finite and not (np.abs(values.astype(np.float64)) <= LARGEST_NUMBER).all():
         fault = f"contains NaN, infinity or numbers above {LARGEST_NUMBER:.0e}"
     if fault:
         raise InputError(name, fault, f"give plain numbers, {wanted}")

@@ -38,6 +38,7 @@ IMAGE_FORMATS = ("PNG", "JPEG", "TIFF")  # Pillow knows others by their content,
 SPLITS = ("train", "test")
 Axes = tuple[str, int | None]  # source and seed; the objects of a source have no seed
 PAGE = ".html"
+LONGEST_TITLE = 200
 FEW_BYTES = 2**16  # of a full disk
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 # Control characters, separators of lines and paragraphs, and bytes that are not of UTF-8.
@@ -87,6 +88,11 @@ def require_memory(needed_bytes: int, file_bytes: int, subject: object, remedy: 
 def is_name(text: str) -> bool:
     """Return whether a text is not blank and fits on a line."""
     return bool(text.strip()) and not any(category(character) in _BREAKS for character in text)
+
+
+def is_title(text: str) -> bool:
+    """Return whether a text can stand in a table: a name of a few words."""
+    return is_name(text) and len(text) <= LONGEST_TITLE
 
 
 def _in_words(axes: Axes) -> str:
@@ -218,12 +224,13 @@ def require_outputs(outputs: Iterable[str | Path], inputs: Iterable[str | Path] 
 
     Of a folder that is read, only pages are replaced.
     """
-    taken = {Path(os.path.realpath(path)) for path in inputs}
+    taken = {_real(path) for path in inputs}
     read = [path for path in taken if path.is_dir()]
     for output in map(Path, outputs):
-        real = Path(os.path.realpath(output))
+        real = _real(output)
         is_read = real.exists() and real.suffix != PAGE and any(map(real.is_relative_to, read))
-        if real in taken or is_read:
+        linked = real.is_file() and real.stat().st_nlink > 1 and any(map(real.samefile, filter(Path.exists, taken)))
+        if real in taken or is_read or linked:
             raise InputError(output, "is also an input or another output", "give each file its own name")
         taken.add(real)
         if real.exists() and not (real.is_dir() if folders else real.is_file()):  # a device would be replaced
@@ -236,6 +243,19 @@ def require_outputs(outputs: Iterable[str | Path], inputs: Iterable[str | Path] 
             raise InputError(
                 output, f"cannot be written: no permission to write to {existing}", "choose another folder"
             )
+
+
+def _real(path: str | Path) -> Path:
+    try:
+        return Path(os.path.realpath(path))
+    except ValueError as fault:
+        raise InputError(repr(str(path)), f"is no name of a file ({fault})", "correct it") from fault
+
+
+def require_page(path: Path) -> None:
+    """Raise an InputError unless a page is named as one, so that nobody reads it as a table."""
+    if path.suffix.lower() != PAGE:
+        raise InputError(path, "is the name of no page", f"let it end in {PAGE}")
 
 
 def sha256_of_file(path: str | Path) -> str:

@@ -180,6 +180,8 @@ def standard_streams() -> Iterator[None]:
         except OSError as fault:
             _discard(sys.stdout)
             raise InputError("stdout", f"cannot be written ({fault.strerror})", "redirect it to a file") from fault
+        except ValueError as fault:  # code from outside has closed it
+            raise InputError("stdout", "has been closed", "leave it open") from fault
 
 
 def say(line: str) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 
 from gpca.alignment.icp import clipped_cost
 from gpca.alignment.methods.interface import Outcome, Pair
-from gpca.alignment.methods.registry import make_method
+from gpca.alignment.methods.registry import make_method, method_entry
 from gpca.causes.policy import NOTHING, QUEUE, Decision, RecoveryPolicy
 from gpca.causes.truth import NOMINAL
 from gpca.classifier.scores import entropy
@@ -342,8 +342,8 @@ class Explainer:
         if method is None:
             [T], [fitness], [rmse] = clouds.icp.register(clouds.source, np.eye(4)[None])
             return Outcome(T, float(fitness), float(rmse))
-        pair = Pair(clouds.source, clouds.target, seed=seed_of("explanation", method)).with_normals()
-        outcome = make_method(method)(pair)
+        pair = Pair(clouds.source, clouds.target, seed=seed_of("explanation", method))
+        outcome = make_method(method)(pair if method_entry(method).points_only else pair.with_normals())
         notes += [] if outcome.converged else [f"{method} failed: {outcome.failure}"]
         return Outcome(outcome.T_target_source, float(outcome.fitness), float(outcome.inlier_rmse))
 

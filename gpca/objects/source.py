@@ -13,11 +13,12 @@ from pathlib import Path
 from types import ModuleType
 
 from gpca.errors import InputError
+from gpca.io.arrays import require_numbers
 from gpca.io.files import sha256_of_file
 from gpca.objects import downloads
 from gpca.objects.surface import Surface
 from gpca.process.code_files import ROOT
-from gpca.process.plugins import joined_outside
+from gpca.process.plugins import joined_outside, load
 
 PROCEDURAL = "procedural"
 KINDS = {
@@ -28,6 +29,7 @@ KINDS = {
     "bop_views": "gpca.frames.bop",
     "mesh_views": "gpca.objects.camera",
 }
+NUMBERED = ("bop", "bop_views")  # whose objects have ids
 SYSTEM = ("/dev", "/proc", "/sys")
 TEXTS = (".md", ".txt")  # licenses beside data
 # Keys of an entry that a procedural source ignores: a config may lay one over a source of files.
@@ -52,6 +54,8 @@ def resolve(entry: dict, data_dir: str | None) -> dict:
             raise InputError(subject, "names no family", "set family in the config")
         module.require_family(entry["family"])
         return {name: value for name, value in entry.items() if name not in FILE_KEYS} | {"origin": PROCEDURAL}
+    if entry.get("objects") and entry["kind"] in set(KINDS).difference(NUMBERED):
+        raise InputError("objects", f"are ids, which the kind {entry['kind']} has not", "leave it out, or use files")
     location, patterns = require_place(entry.get("location") or ""), entry.get("files") or ()
     for pattern in patterns:
         remedy = "give one relative to location"
@@ -71,6 +75,8 @@ def resolve(entry: dict, data_dir: str | None) -> dict:
             require_whole_if_ours(folder)
             if require_entry := getattr(module, "require_entry", None):
                 require_entry(entry, folder)
+            if folder.is_dir() and (idle := [pattern for pattern in patterns if not any(folder.glob(pattern))]):
+                raise InputError(f"pattern '{idle[0]}'", f"matches no file in {folder}", "correct files in the config")
             return {**entry, "origin": "local", "location": os.path.abspath(folder)}
     urls, checksums = _as_list(entry.get("urls") or entry.get("url")), _as_list(entry.get("sha256"))
     if not urls:
@@ -96,7 +102,23 @@ def surfaces(entry: dict, cache_folder: str | Path) -> Iterator[Surface]:
         return
     archives = getattr(module, "READS_ARCHIVES", False)
     for folder in folders(entry, cache_folder, unpack=not archives):
-        yield from module.from_entry(entry, folder)
+        for surface in module.from_entry(entry, folder):
+            _require_surface(surface, f"source '{entry['title']}'")
+            yield surface
+
+
+def _require_surface(surface: object, subject: str) -> None:
+    """Raise an InputError unless code from outside yielded a surface of plain numbers."""
+    if not isinstance(surface, Surface) or not isinstance(surface.name, str):
+        raise InputError(subject, f"yields a {type(surface).__name__}", "make it yield a named Surface")
+    name, size = f"{subject}: object {surface.name!r}", (None, 3)
+    vertices_m = require_numbers(surface.vertices_m, size, f"{name}: vertices_m", "f", finite=False)
+    if surface.normals is not None:
+        require_numbers(surface.normals, vertices_m.shape, f"{name}: normals", "f")
+    if surface.faces is not None:
+        faces = require_numbers(surface.faces, size, f"{name}: faces", "iu")
+        if not ((faces >= 0) & (faces < len(vertices_m))).all():
+            raise InputError(name, f"has faces of vertices beyond its {len(vertices_m)}", "number them from 0")
 
 
 def folders(entry: dict, cache_folder: str | Path, unpack: bool = True) -> list[Path]:
@@ -171,7 +193,10 @@ def _module_of(kind: object) -> ModuleType:
     kinds = _kinds()
     if kind not in kinds:
         raise InputError(f"kind '{kind}'", "is not a kind of source", f"choose one of {', '.join(kinds)}")
-    return import_module(kinds[str(kind)])
+    module = import_module(kinds[str(kind)]) if kind in KINDS else load(kinds[str(kind)])
+    if not hasattr(module, "surfaces" if kind == PROCEDURAL else "from_entry"):
+        raise InputError(f"kind '{kind}'", f"its module {module.__name__} has no from_entry", "see docs/adding.md")
+    return module
 
 
 def _kinds() -> dict[str, str]:

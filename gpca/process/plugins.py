@@ -24,7 +24,7 @@ from types import ModuleType
 from typing import Any
 
 from gpca.errors import InputError
-from gpca.io.files import is_name
+from gpca.io.files import LONGEST_TITLE, is_title
 
 GROUPS = {  # group of entry points -> variables of its modules
     "gpca.explainers": ("EXPLAINERS", "CAUSE_EXPLAINERS"),
@@ -77,8 +77,9 @@ def entries_outside(variable: str, kind: str, of: type, taken: Iterable[str]) ->
             if not isinstance(entry, of):
                 raise InputError(module_name, f"{variable}['{name}'] is {_a(type(entry))}", f"make it {_a(of)}")
             title = name if isinstance(entry, str) else getattr(entry, "title", name)
-            if not isinstance(title, str) or not is_name(title):
-                raise InputError(module_name, f"{variable}['{name}'] has the title {title!r}", "give a line of text")
+            if not isinstance(title, str) or not is_title(title):
+                fault = f"{variable}['{name}'] has the title {repr(title)[:80]}"
+                raise InputError(module_name, fault, f"give a line of at most {LONGEST_TITLE} letters")
             if name in names:
                 raise InputError(module_name, f"there is another {kind} '{name}'", "choose a name of your own")
             names.add(name)

@@ -145,7 +145,7 @@ def learn_explainers(
     fitted, attach, explain = {}, {}, {}
     for name in names:
         entry = explainer_entry(name)
-        fitted[name] = entry.make(source, seed, **(settings.get(name) or {}))
+        fitted[name] = entry.made(source, seed, **(settings.get(name) or {}))
         reads_embeddings = entry.reads == "embeddings"
         attach[name], explain[name] = embedded if reads_embeddings else remedied, partial(timed, name)
         learned = train if reads_embeddings else train.subset(np.arange(len(train))[:most_remedied])

@@ -10,8 +10,9 @@ from time import perf_counter
 import numpy as np
 import pandas as pd
 
+from gpca.causes.policy import NOTHING, QUEUE, Decision
 from gpca.causes.settings import CauseSettings
-from gpca.errors import InputError
+from gpca.errors import InputError, require_known
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
 from gpca.recovery.actions import Action, Holding, Robot
@@ -111,13 +112,25 @@ class Loop:
         order = sorted(range(len(rows)), key=lambda n: (rows[n]["episode"], policies.index(rows[n]["policy"]), n))
         return pd.DataFrame([rows[n] for n in order]), pd.DataFrame([seconds[n] for n in order])
 
+    def _decision(self, name: str, decide: Decide, case: Case) -> Decision:
+        """Return what a policy, perhaps one from outside, decides; InputError for what nobody could do."""
+        decision, subject = decide(case), f"recovery policy '{name}'"
+        if not isinstance(decision, Decision) or not all(isinstance(text, str) for text in vars(decision).values()):
+            raise InputError(subject, f"returns a {type(decision).__name__}", "make it return a Decision of texts")
+        actions = (*self.actions, *self.means.policy.treatments.values(), QUEUE, NOTHING)
+        require_known(f"{subject}: action", decision.action, actions)
+        require_known(f"{subject}: concept", decision.concept, (*CONCEPTS, ""))
+        return decision
+
     def _step(
         self, episode: Episode, name: str, entry: PolicyEntry, decide: Decide, before: Taken, history: Sequence[Answer]
     ) -> tuple[dict, dict]:
         """Let one policy decide and act; return its row and its seconds."""
         reenacted = self.reenactor.reenact(episode, before) if entry.reenacts else None
         started = perf_counter()
-        decision = decide(
+        decision = self._decision(
+            name,
+            decide,
             Case(
                 actions=before,
                 scores_T_C=np.array([answer.scores_C for answer in history]) if history else None,
@@ -127,7 +140,7 @@ class Loop:
                 cause=episode.situation.cause if entry.oracle and episode.failed else "",
                 random=generator(*self.axes, "policy", episode.number),
                 reenacted=reenacted,
-            )
+            ),
         )
         spent = perf_counter() - started + (reenacted.seconds if reenacted else 0.0)
         last = history[-1] if history else UNEXPLAINED

@@ -125,8 +125,12 @@ def align_from_many(
 
 
 METHODS = {
-    "posterior": MethodEntry("EM from many starts, initial pose as prior", partial(align, True)),
-    "posterior_global": MethodEntry("EM from many starts", partial(align, False), is_global=True),
-    "multistart": MethodEntry("ICP from many starts, least trimmed cost", partial(align_from_many, False)),
-    "multistart_likelihood": MethodEntry("ICP from many starts, likeliest end", partial(align_from_many, True)),
+    "posterior": MethodEntry("EM from many starts, initial pose as prior", partial(align, True), points_only=True),
+    "posterior_global": MethodEntry("EM from many starts", partial(align, False), is_global=True, points_only=True),
+    "multistart": MethodEntry(
+        "ICP from many starts, least trimmed cost", partial(align_from_many, False), points_only=True
+    ),
+    "multistart_likelihood": MethodEntry(
+        "ICP from many starts, likeliest end", partial(align_from_many, True), points_only=True
+    ),
 }

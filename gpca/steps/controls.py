@@ -165,7 +165,7 @@ class ControlRun:
         test = plain.subset(plain.rows("test")[:ASKED])
         for name, rival in self.rivals.items():  # times what explainers of bare registrations measure before they can
             if rival.reads == BARE:
-                bare, explainer, started = replace(test, attached={}), rival.make(), perf_counter()
+                bare, explainer, started = replace(test, attached={}), rival.made(), perf_counter()
                 described = explainer.describe(bare) if isinstance(explainer, Describing) else bare
                 _attached({name: embeds[name]} if name in embeds else {}, described)
                 self.costs.asking[name] = (perf_counter() - started) / len(test)
@@ -185,7 +185,7 @@ class ControlRun:
         """Attribution of the hard test samples by one explainer, and its seconds for each of them."""
         assert self.hard is not None
         changed = self._changed(HARD, self.hard, {})
-        explainer, test = self.rivals[name].make(), changed.subset(changed.rows("test"))
+        explainer, test = self.rivals[name].made(), changed.subset(changed.rows("test"))
         explainer.fit(changed.subset(changed.rows("train")))
         attribution = answer_of(explainer, test.without_labels())
         return attribution, float(attribution.seconds_N.mean())
@@ -209,7 +209,7 @@ class ControlRun:
         train = registrations.subset(registrations.rows("train"))
         embeds = {}
         for name, rival in self.rivals.items():
-            explainer = rival.make()
+            explainer = rival.made()
             if isinstance(explainer, Encoding):
                 with self.costs.count_learning(control, name):
                     embeds[name] = explainer.learn_encoder(train)
@@ -255,7 +255,7 @@ class ControlRun:
             if control in RELABELED:
                 train = samples.relabeled(control, train, *axes, *([part] if control == "shuffled" else []))
             for name, rival in rivals.items():
-                explainer = rival.make()
+                explainer = rival.made()
                 if control in RELABELED and getattr(explainer, "trained_with_encoder", False):
                     continue
                 if control != HARD and rival.reads == REENACTED:

@@ -121,7 +121,7 @@ def explained(
     files of other sources, whose training rows are learned from too unless a family of theirs is tested. Files of
     `further` samples are for an explainer that learns from these.
     """
-    explainer = entry.make(*(causes.registrations.axes or ()), **settings)
+    explainer = entry.made(*(causes.registrations.axes or ()), **settings)
     registrations = with_what_it_reads(labeled(causes), entry.reads, read)
     learned = [registrations.subset(training_rows(registrations, path))]
     for other, other_read in others:
@@ -252,7 +252,7 @@ class World:
             for rows, learned in parts:
                 if self._fold_S is not None and len(np.unique(learned.concept)) < FEWEST_LABELS:
                     return None
-                explainer = entry.make(*self._axes, **settings)
+                explainer = entry.made(*self._axes, **settings)
                 further = self._files.get("further", []) if learned_from == OBJECTS else []
                 fit(explainer, entry, [learned], further, self._left_out if learned_from == OBJECTS else ())
                 answers.append(answer_of(explainer, observed_only(asked.subset(rows)), LABELS))

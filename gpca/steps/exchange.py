@@ -136,7 +136,7 @@ class Exchange:
             registered[name] = described_for(rivals, seen), failure_S
         for learnt_from, (train, _) in registered.items():
             for explainer_name, rival in rivals.items():
-                explainer = rival.make()
+                explainer = rival.made()
                 explainer.fit(train.subset(train.rows("train")))
                 for asked_of, (tested, failure_S) in registered.items():
                     test = tested.subset(tested.rows("test"))
@@ -164,7 +164,7 @@ class Exchange:
             train_estimates, test_estimates = estimates_of_train[estimator], estimates_of_test[estimator]
             for name, rival in rivals.items():
                 floor, conditions = self.uncertainty.floor, len(OBSERVED if rival.observed_only else ADDITIVE_KNOBS)
-                explainer, failure_S = rival.make(), test_estimates.failures(conditions)
+                explainer, failure_S = rival.made(), test_estimates.failures(conditions)
                 if rival.observed_only:
                     usable = np.flatnonzero(train_estimates.failures(len(OBSERVED)) == "")
                     if set(train.concept[usable]) < set(CONCEPTS):

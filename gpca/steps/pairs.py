@@ -152,7 +152,7 @@ def attribute(job: Job) -> None:
     lists = [job.get(name, [None] * len(job.seeds)) for name in names]
     files = [dict(zip(names, of_seed, strict=True)) for of_seed in zip(*lists, strict=True)]
     for (seed, predictions, timings), read in zip(job.per_seed("predictions", "timings"), files, strict=True):
-        explainer = entry.make(job.source, seed, **job.settings)
+        explainer = entry.made(job.source, seed, **job.settings)
         inputs = [path for path in read.values() if path]
         with record_provenance([predictions, timings], inputs, job.settings, seed=seed):
             axes = (job.get("files_of", job.source), job.get("files_seed", seed))

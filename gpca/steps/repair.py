@@ -24,7 +24,7 @@ from gpca.causes.scans import OverlapErrors
 from gpca.causes.settings import OBSERVED, CauseSettings, Moved
 from gpca.causes.truth import capped
 from gpca.errors import InputError
-from gpca.io.arrays import TEXT, WHOLE
+from gpca.io.arrays import TEXT, WHOLE, require_numbers
 from gpca.io.container import Container, array
 from gpca.io.csv_file import ANY, finite_number, numbers, read_csv, write_csv
 from gpca.jobs.job import Job
@@ -313,10 +313,14 @@ class Rivals:
         confidence; a function that abstains leaves the registered pose, which is not accepted."""
         started = perf_counter()
         answer = function(self.before.copy(), self.pair.model.copy(), np.eye(4))
+        if isinstance(answer, tuple) and len(answer) != 2:
+            raise InputError(
+                f"function {name}", f"returns {len(answer)} things", "return a pose, or it and a confidence"
+            )
         T, confidence = answer if isinstance(answer, tuple) else (answer, 0.0)
         if T is None:
             return self._tried(name, started, inverse(self.pair.T_init), failed=True)
-        T = np.asarray(T, float)
+        T = require_numbers(T, (4, 4), f"pose by {name}").astype(float)
         require_rigid(T, f"pose by {name}")
         return self._tried(name, started, T, finite_number(name, "confidence", str(confidence), "return a number") * -1)
 

@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.io.files import is_name, require_file, whole_file
+from gpca.io.files import is_title, require_file, whole_file
 from gpca.numerals import LARGEST_NUMBER, decimal, whole
 from gpca.tracks.published import NO_CALLS, NOTHING_NAMED, Method, Published
 from gpca.tracks.track import TRACKS
@@ -88,6 +88,8 @@ def read_submission(path: Path, published: Published) -> tuple[Submission | None
         return None, faults
     length = next((number for number, line in enumerate(lines) if not line.startswith("#")), len(lines))
     head = _read_head(lines[:length], published, fault)
+    if head.get("track") not in (None, published.track.name):  # its rows say nothing
+        return None, faults
     try:
         predictions = _read_rows(lines[length:], length, published, fault)
     except csv.Error as damage:
@@ -111,8 +113,9 @@ def _read_head(lines: list[str], published: Published, fault: Fault) -> dict[str
             fault(f"line {number}", f"'{key}' stands there twice", "keep one of them")
         head[key] = value
     for key, words in HEAD.items():
-        if not is_name(head.get(key, "")):
-            fault("", f"its head lacks '{key}'", f"add a line '# {key}: …', {words}")
+        if not is_title(head.get(key, "")):
+            what = "has a long or broken" if head.get(key) else "lacks"
+            fault("", f"its head {what} '{key}'", f"add a line '# {key}: …', {words}")
     track, version = published.track.name, published.version
     if head.get("track", track) != track:
         fault("", f"is of the track '{head['track']}', not {track}", "name the track that it is of")

@@ -207,6 +207,14 @@ VALUES = [
     # objects
     (source(kind="bop", objects=[1, 2]), "sources.mine", "obj_000002.ply: no such model; check objects in the config"),
     (source(kind="bop", objects=[1, 1]), "sources.mine.objects", "twice"),
+    (source(objects=[1]), "sources.mine", "objects: are ids, which the kind mesh_folder has not"),
+    (source(kind="bop_views", unit="mm", objects=[3, 9]), "sources.mine", "parts: no frame shows object 9"),
+    (source(kind="bop_views", unit="cm"), "sources.mine", "unit 'cm': is not that of BOP frames"),
+    (source(kind="bop", files=["*.none"]), "sources.mine", "pattern '*.none': matches no file in"),
+    ({"splits": {"objects": "nowhere.csv"}}, "splits.objects", "nowhere.csv: no such file"),
+    ({"splits": {"scenes": "splits/objects.csv"}}, "splits.scenes", "column 'dataset' is missing"),
+    (frames(split="parts", models="nowhere"), "real_world.datasets.mine", "nowhere: no such folder"),
+    (frames(split="other"), "real_world.datasets.mine", "parts: has no other*/<scene>/scene_gt.json"),
     # patterns
     (source(files=["../*.ply"]), "sources.mine", "pattern '../*.ply': leads out of location"),
     (frames(split="../test"), "real_world.datasets", "leads out of location"),
@@ -227,9 +235,14 @@ VALUES = [
 
 @pytest.mark.parametrize(("config", "words"), [(config, words) for config, *words in VALUES])
 def test_a_value_that_cannot_be(tmp_path, config, words):
-    for name in ("parts/models/obj_000001.ply", "parts/parts/000001/scene_gt.json"):
-        (tmp_path / name).parent.mkdir(parents=True)
-        (tmp_path / name).write_text("ply")
+    shown = '{"0": [{"obj_id": 3}]}'
+    for name, text in {
+        "models/obj_000001.ply": "ply",
+        "parts/000001/scene_gt.json": "ply",
+        "test/1/scene_gt.json": shown,
+    }.items():
+        (tmp_path / "parts" / name).parent.mkdir(parents=True)
+        (tmp_path / "parts" / name).write_text(text)
     (tmp_path / "loop").symlink_to("loop")
     (tmp_path / "link").symlink_to("/dev")
     os.mkfifo(tmp_path / "fifo")

@@ -137,3 +137,8 @@ def test_scenes_replace_scenes(scenes, tmp_path):
     shutil.copytree(scenes, tmp_path / "tiny")
     write_scenes(surfaces(), "tiny", scene_settings(count=2, views=1), tmp_path / "tiny")
     assert len(list((tmp_path / "tiny").rglob("depth/*.png"))) == 2
+    for name in ("thesis.tex", "test/000000/depth/thesis.png"):
+        (tmp_path / "tiny" / name).write_text("years of work")
+        with pytest.raises(InputError, match=f"contains files other than scenes, .* {name}; choose another folder"):
+            write_scenes(surfaces(), "tiny", scene_settings(count=2, views=1), tmp_path / "tiny")
+        (tmp_path / "tiny" / name).unlink()

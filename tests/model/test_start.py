@@ -27,13 +27,16 @@ WITHOUT = {
 PRINTED = f"print(*sorted({WITHOUT} & set(sys.modules)), file=sys.stderr)"
 
 
-@pytest.mark.parametrize("target", ["target.stl", "target.obj", "target.off", "cloud.ply"])
-def test_an_explanation_loads_no_library_that_it_does_without(target, saved, tmp_path):
+@pytest.mark.parametrize(
+    ("target", "more"),
+    [("target.stl", []), ("target.obj", []), ("target.off", []), ("cloud.ply", ["--method", "point_to_point"])],
+)
+def test_an_explanation_loads_no_library_that_it_does_without(target, more, saved, tmp_path):
     ball = trimesh.creation.icosphere(3, radius=0.05)
     for name in ("target.stl", "target.obj", "target.off"):
         ball.export(tmp_path / name)
     trimesh.PointCloud(np.array(ball.vertices)).export(tmp_path / "cloud.ply")
-    words = ["explain", "cloud.ply", target, "--model", str(saved), "--json", "--html", "page.html"]
+    words = ["explain", "cloud.ply", target, "--model", str(saved), "--json", "--html", "page.html", *more]
     code = f"import sys; sys.path.insert(0, {str(ROOT)!r}); from gpca.__main__ import main; main({words}); {PRINTED}"
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
     assert done.stdout.startswith('{"T_target_source"')

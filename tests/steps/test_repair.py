@@ -34,6 +34,19 @@ def ask(causes, four):
     return asked
 
 
+@pytest.mark.parametrize(
+    ("answer", "words"),
+    [
+        ("pose", "pose by mine: is of type str"),
+        (np.eye(4, dtype=complex), "pose by mine: has type complex128"),
+        ((np.eye(4), 1.0, 2), "function mine: returns 3 things"),
+    ],
+)
+def test_a_function_returns_a_pose(ask, answer, words):
+    with pytest.raises(InputError, match=words):
+        ask({"mine": lambda *_: answer})
+
+
 def test_a_function_stands_beside_the_built_in_rivals(ask, causes):
     truths = iter([causes.registrations.T_target_source("true", row) for row in causes.rows("test")[:3]])
     tested, attempts, seconds = ask({"knows": lambda *_: (next(truths), 2.0), "abstains": lambda *_: None})

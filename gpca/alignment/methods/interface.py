@@ -104,3 +104,4 @@ class MethodEntry:
     align: Callable[..., Outcome]  # ``align(pair, **settings)`` returns an outcome or raises FailedRegistration
     is_global: bool = False  # whether it needs no initial pose
     package: str = ""  # a required module that the suite does not install, if any
+    points_only: bool = False  # whether it needs neither normals nor Open3D

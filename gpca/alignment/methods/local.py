@@ -113,7 +113,7 @@ def align_by_small_gicp(
 
 _to_planes = partial(align_by_open3d, "point_to_plane")
 METHODS = {
-    "point_to_point": MethodEntry("ICP, point-to-point", align_compiled),
+    "point_to_point": MethodEntry("ICP, point-to-point", align_compiled, points_only=True),
     "point_to_point_open3d": MethodEntry(
         "ICP, point-to-point (Open3D)", partial(align_by_open3d, "point_to_point", None)
     ),
@@ -123,5 +123,5 @@ METHODS = {
     "geman_mcclure": MethodEntry("ICP, point-to-plane, Geman-McClure", partial(_to_planes, "GMLoss")),
     "tukey": MethodEntry("ICP, point-to-plane, Tukey", partial(_to_planes, "TukeyLoss")),
     "gicp": MethodEntry("GICP", partial(align_by_open3d, "generalized", None)),
-    "gicp_small": MethodEntry("GICP (small_gicp)", align_by_small_gicp, package="small_gicp"),
+    "gicp_small": MethodEntry("GICP (small_gicp)", align_by_small_gicp, package="small_gicp", points_only=True),
 }

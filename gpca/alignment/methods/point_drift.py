@@ -61,4 +61,4 @@ def _at_scale_1(registration: Any) -> Any:
     return Drift
 
 
-METHODS = {"cpd": MethodEntry("Coherent point drift", align, package="pycpd")}
+METHODS = {"cpd": MethodEntry("Coherent point drift", align, package="pycpd", points_only=True)}

@@ -1,7 +1,10 @@
 """Every registration method by name, one or several per file of this folder, and those that the re-enactment has."""
 
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import nullcontext
+from functools import partial
 from importlib.util import find_spec
+from typing import Any
 
 import numpy as np
 
@@ -66,15 +69,18 @@ def make_method(name: str, settings: Mapping[str, object] | None = None) -> Call
     settings = dict(settings or {})
     require_settings(name, settings)
     _require_package(name, "install it or leave the method out")
-    align = method_entry(name).align
-    utility = require_open3d().utility  # loads the thread pools that are limited below
+    entry = method_entry(name)
+    quiet: Any = nullcontext
+    if not entry.points_only:
+        utility = require_open3d().utility  # loads the thread pools that are limited below
+        # Its warnings go to standard output, and repeat the outcome.
+        quiet = partial(utility.VerbosityContextManager, utility.VerbosityLevel.Error)
     threads = ThreadpoolController()
 
     def register(pair: Pair) -> Outcome:
         try:
-            # Open3D's warnings go to standard output, and repeat the outcome.
-            with threads.limit(limits=1), utility.VerbosityContextManager(utility.VerbosityLevel.Error):
-                outcome = align(pair, **settings)
+            with threads.limit(limits=1), quiet():
+                outcome = entry.align(pair, **settings)
             if not isinstance(outcome, Outcome):
                 fault = f"returns a {type(outcome).__name__}"
                 raise InputError(f"registration method '{name}'", fault, "make it return an Outcome")

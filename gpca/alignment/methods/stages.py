@@ -232,6 +232,6 @@ VARIANTS: dict[str, tuple[str, str, Callable]] = {  # title, and what one stage 
     "weight_distance": ("ICP, weights by distance", "weigh", weigh_distance),
     "weight_normals": ("ICP, weights by normals", "weigh", weigh_normals),
 }
-METHODS = {"trimmed": MethodEntry("Trimmed ICP", align_trimmed)} | {
+METHODS = {"trimmed": MethodEntry("Trimmed ICP", align_trimmed, points_only=True)} | {
     name: MethodEntry(title, partial(align_variant, stage, change)) for name, (title, stage, change) in VARIANTS.items()
 }
