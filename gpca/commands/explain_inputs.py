@@ -76,6 +76,8 @@ def from_rows(options: Namespace, columns: Sequence[str] = COLUMNS) -> list[tupl
     names = list(table.fieldnames or ())
     if twice := [name for name in names if names.count(name) > 1]:
         raise InputError(path, f"column '{twice[0]}' occurs twice", PAIRS_REMEDY)
+    if broken := [place for place, row in rows if "\0" in "".join(map(str, row.values()))]:
+        raise InputError(broken[0], "has a zero byte", "write it anew")
     if unused := [name for name in names if name not in USED]:
         print(f"{path}: the column '{printable(unused[0])}' is not used", file=sys.stderr)
     if missing := [column for column in columns if column not in names]:

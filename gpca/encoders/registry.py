@@ -53,8 +53,8 @@ def make_encoder(backbone: str, options: dict):
         raise InputError(f"backbone '{backbone}'", str(fault), "give ENCODERS module:class") from fault
     size = getattr(encoder, "embedding_size", None)
     if not hasattr(encoder, "state_dict") or type(size) is not int or size < 1:
-        fault = f"is a {type(encoder).__name__} whose embedding_size is {size!r}"
-        raise InputError(f"backbone '{backbone}'", fault, "make it a module of torch with a whole embedding_size")
+        words = f"is a {type(encoder).__name__} whose embedding_size is {size!r}"
+        raise InputError(f"backbone '{backbone}'", words, "make it a module of torch with a whole embedding_size")
     return encoder
 
 

@@ -103,7 +103,7 @@ def surfaces(entry: dict, cache_folder: str | Path) -> Iterator[Surface]:
     archives = getattr(module, "READS_ARCHIVES", False)
     for folder in folders(entry, cache_folder, unpack=not archives):
         for surface in module.from_entry(entry, folder):
-            _require_surface(surface, f"source '{entry['title']}'")
+            _require_surface(surface, f"source '{entry.get('title', entry['kind'])}'")
             yield surface
 
 

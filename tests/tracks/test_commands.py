@@ -51,7 +51,7 @@ def test_an_explainer_of_the_suite_can_be_run_again(published, run, apart, capsy
         (["causes", "leaves.py"], "leaves.py: cannot be imported (SystemExit: 0)"),
         (["causes", "number.py"], "number.py: lists no CAUSE_EXPLAINERS"),
         (["causes", "above.py"], "CAUSE_EXPLAINERS has the name '../x'; use letters, digits and underscores"),
-        (["causes", "two_lines.py"], "has the title 'a\\n# link: b'; give a line of text"),
+        (["causes", "two_lines.py"], "has the title 'a\\n# link: b'; give a line of at most 200 letters"),
         (["causes", "my_method.py", "--settings", json.dumps({"sharp": 1})], "setting sharp: unknown"),
     ],
 )
