@@ -82,7 +82,7 @@ def observe(
         is_lone, matched = np.zeros(len(points), bool), ~is_outlier
     residuals, rows = surface.residuals(points)
     noise = scale.noise(residuals[matched])
-    covered = covered_points(surface.points, points[matched], noise, random)
+    covered = covered_points(surface, points[matched], noise, random)
     return Observation(points, is_outlier, is_lone, noise, residuals, rows, covered)
 
 
@@ -131,8 +131,11 @@ def rebuild(T: np.ndarray, observation: Observation, surface: ModelSurface, rand
 
 
 def completed(surface: ModelSurface, observation: Observation) -> ModelSurface:
-    """Return the surface with what was observed of the part that the model lacks, if it lacks any."""
-    if observation.is_lone.mean() < LEAST_LACKING:
+    """Return the surface with what was observed of the part that the model lacks, if it lacks any.
+
+    A symmetric model stays one: what is observed beside it may be another thing.
+    """
+    if observation.is_lone.mean() < LEAST_LACKING or surface.symmetric:
         return surface
     return surface.completed(observation.points[observation.is_lone], observation.noise)
 

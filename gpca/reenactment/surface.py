@@ -1,12 +1,12 @@
 """A model cloud as a surface: local planes, spacing, roughness, and which part of it an observation misses.
 
-All lengths are relative to the diameter, all points lie in the model's frame. The missing part is a half-space: the one
-that takes most of the model and next to nothing observed.
+All lengths are relative to the diameter, all points lie in the model's frame. The missing part is a half-space, the one
+that takes most of the model and next to nothing observed, unless another region explains more.
 """
 
 from __future__ import annotations
 
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -15,6 +15,7 @@ from gpca.alignment.batched_icp import make_target
 from gpca.causes.truth import LARGEST_ERROR
 from gpca.objects.bop import find_symmetries
 from gpca.pairs.distances import dots, second_moments
+from gpca.reenactment.regions import DIRECTIONS, Regions, directions
 from gpca.reenactment.surface_kernels import nearest_rows, shares_within, surface_distances
 
 JUDGED = 256  # points over which an error is the mean
@@ -120,6 +121,11 @@ class ModelSurface:
         return np.maximum(distance_n_P.mean(axis=1), distance_n_P[:, farthest] / UNEVEN)
 
     @cached_property
+    def regions(self) -> Regions:
+        """The parts of it that may have been observed."""
+        return Regions(self.points, self.spacing)
+
+    @cached_property
     def _target(self):
         """The points for compiled searches, and their rows in `points`, normals, and how far their surface reaches."""
         target = make_target(self.points, LARGEST_ERROR)
@@ -147,7 +153,6 @@ def _moved(T_n: np.ndarray, points: np.ndarray) -> np.ndarray:
     return np.moveaxis(x * rows[:, :, 0] + y * rows[:, :, 1] + z * rows[:, :, 2] + rows[:, :, 3], 1, 2)
 
 
-DIRECTIONS = 150
 BEYOND = 2.5  # observed points that may lie beyond the plane,
 BEYOND_SHARE = 0.01  # or this share of them
 LEAST_SHARE = 0.07  # of the model, that counts as missing: as much may lie beyond the plane by chance
@@ -162,7 +167,14 @@ def share_within(model: np.ndarray, observed: np.ndarray, noise: float, random: 
     return _cut(model, observed, noise * random.normal(size=len(model)))[1]
 
 
-def covered_points(model: np.ndarray, observed: np.ndarray, noise: float, random: np.random.Generator) -> np.ndarray:
+def covered_points(
+    surface: ModelSurface, observed: np.ndarray, noise: float, random: np.random.Generator
+) -> np.ndarray:
+    """Return which points (M,) of a model were observed, by points (N, 3) without outliers."""
+    return surface.regions.likeliest(before_plane(surface.points, observed, noise, random), observed, noise)
+
+
+def before_plane(model: np.ndarray, observed: np.ndarray, noise: float, random: np.random.Generator) -> np.ndarray:
     """Return which points of a model (M, 3) lie on the side of the plane that was observed, (M,) bool.
 
     The model is blurred as much as what was observed, (N, 3) without outliers; what of it reaches as far is covered.
@@ -194,12 +206,3 @@ def _cut(model: np.ndarray, observed: np.ndarray, blur_M: np.ndarray) -> tuple[n
 def _beyond(count: int) -> int:
     """Return how many of the observed points may lie beyond the plane."""
     return max(0, count - 1 - int(np.ceil((1 - max(BEYOND_SHARE, BEYOND / count)) * (count - 1))))
-
-
-@cache
-def directions() -> np.ndarray:
-    """Return unit vectors (K, 3) spread evenly over the sphere (a spiral of Fibonacci)."""
-    i = np.arange(DIRECTIONS) + 0.5
-    z, turn = 1 - 2 * i / DIRECTIONS, np.pi * (1 + 5**0.5) * i
-    across = np.sqrt(1 - z * z)
-    return np.column_stack([np.cos(turn) * across, np.sin(turn) * across, z])

@@ -69,7 +69,7 @@ def seen(points, share, along):
 
 
 def covered(model, observed, noise, seed=0):
-    return covered_points(model.points, observed, noise, np.random.default_rng(seed))
+    return covered_points(model, observed, noise, np.random.default_rng(seed))
 
 
 @pytest.mark.parametrize("share", [0.2, 0.4, 0.6])
