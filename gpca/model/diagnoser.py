@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from gpca.alignment.batched_icp import BatchedICP
-from gpca.alignment.icp import ICPSettings
+from gpca.alignment.batched_icp import icp_to
+from gpca.alignment.icp import ICPSettings, Method
 from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.causes.settings import CauseSettings, Moved
 from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
@@ -53,6 +53,14 @@ MISSED = 0.05  # largest probability that a failure is called good
 ENDS = ("_low", "_high")  # of the interval of a measure
 
 
+# Method of a registration -> the ICP that runs it again.
+RUN_AGAIN: Mapping[str, Method] = {
+    "point_to_plane": "point_to_plane",
+    "gicp": "generalized",
+    "gicp_small": "generalized",
+}
+
+
 @dataclass(frozen=True)
 class Diagnoser:
     """Classifiers on the features of a pair, and the settings with which these are measured."""
@@ -72,6 +80,12 @@ class Diagnoser:
         reenactment = replace(self.reenactment, hypotheses=min(self.reenactment.hypotheses, QUICK_HYPOTHESES))
         levels = tuple(replace(level, guarantee=None) for level in self.levels)
         return replace(self, points=min(self.points, QUICK_POINTS), reenactment=reenactment, levels=levels)
+
+    def by_method(self, method: str | None) -> Diagnoser:
+        """Return a diagnoser that registers again by a method, if it is a kind of ICP that runs from many starts."""
+        if (kind := RUN_AGAIN.get(method or "", self.runs.icp.method)) == self.runs.icp.method:
+            return self
+        return replace(self, runs=replace(self.runs, icp=replace(self.runs.icp, method=kind)))
 
     @property
     def truth(self) -> CauseSettings:
@@ -133,7 +147,7 @@ class Diagnoser:
         )
         starts_n = exp(generator("diagnosis", "starts").normal(size=(self.runs.starts, 6)) * self.runs.deviation_6())
         starts_n[0] = T_icp
-        icp = BatchedICP(model, self.runs.icp)
+        icp = icp_to(model, self.runs.icp)
         T_n, fitness_n, rmse_n = icp.register(observed, starts_n)
         if not register:
             T_n[:1], fitness_n[:1], rmse_n[:1] = icp.register(observed, starts_n[:1], max_iterations=0)

@@ -121,7 +121,7 @@ class Explainer:
         diagnosis = None
         enactments: list[Enactment] = []
         if diagnose:
-            diagnoser = self.model.diagnoser.quick() if fast else self.model.diagnoser
+            diagnoser = (self.model.diagnoser.quick() if fast else self.model.diagnoser).by_method(method)
             with _timed(seconds, "diagnosis"):
                 aligned = clouds.source, clouds.target, T_found
                 diagnosis, enactments = diagnoser.diagnose(*aligned, register, limit / clouds.frame.diameter)

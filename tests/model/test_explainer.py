@@ -193,7 +193,11 @@ def test_a_method_finds_the_pose_and_the_scores_are_those_at_it(explainer, model
     [scores_C] = model.gpc.attribute(explainer.embed(transform(expected, own.source)))[0]
     np.testing.assert_allclose(list(explanation.scores.values()), scores_C, atol=1e-6)
     assert explanation.method == "gicp"
-    assert explainer.explain(source, target).method == "point_to_point"
+    by_points = explainer.explain(source, target)
+    assert by_points.method == "point_to_point"
+    again = model.diagnoser.by_method("gicp").diagnose(own.source, own.target, expected)[0]
+    assert explanation.diagnosis.start == pytest.approx(again.start) != pytest.approx(by_points.diagnosis.start)
+    assert model.diagnoser.by_method("fpfh_ransac") is model.diagnoser is model.diagnoser.by_method(None)
 
 
 def test_a_global_method_needs_no_initial_pose_and_gives_the_same_numbers_again(explainer, pair):

@@ -1,5 +1,6 @@
 """The steps of shifted truths, from the drawing of samples to the table."""
 
+import pandas as pd
 import pytest
 
 from gpca.attribution.predictions import read_predictions
@@ -107,5 +108,21 @@ def test_both_tables_show_all_explainers_and_shifts(folder):
     rows = experiment.collect(RUN, [folder / "diagnoses/seed100.csv"], *truth_files(folder))
     whole, by_shift = experiment.table9_shift(RUN, rows).markdown(), experiment.table9_shifts(RUN, rows).markdown()
     assert "| Re-enactment (untrained) | its starts and limits, and every registration method |" in whole
+    assert "The aim is " in whole.partition("As learned:")[0]
     assert "| nothing |" in whole and "| its samples |" in whole
     assert all(f"| {title} |" in by_shift for title in ("As learned", "Scaled", "Planes", "Mean over shifts"))
+
+
+def test_an_aim_is_reached_by_the_mean_its_interval_and_every_shift():
+    def sentence(mean, low, scaled):
+        keys = ("causes", "pooled", "reenact", "balanced_accuracy")
+        rows = [(*keys, "mean", "trained", "residuals", 1, 2, 9, mean, low, 0.2)]
+        rows.append((*keys, "scaled", "trained", "residuals", 1, 2, 9, scaled, -0.1, 0.2))
+        return experiment.reached_by(
+            "reenact", pd.DataFrame(rows, columns=[*KEYS, *AGAINST, *NUMBERS]), {"scaled": "S"}
+        )
+
+    assert sentence(0.06, 0.01, -0.02).startswith("The aim is reached")
+    for missed in ((0.04, 0.01, 0.1), (0.06, -0.01, 0.1), (0.06, 0.01, -0.04)):
+        assert sentence(*missed).startswith("The aim is not reached")
+    assert sentence(0.06, 0.01, -0.04).endswith("leads by 6.0 (1.0 to 20.0); below -3 under: S.")
