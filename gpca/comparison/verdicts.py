@@ -30,7 +30,9 @@ VERDICTS = (*JUDGED, NOT_COMPARABLE, NOT_RUN)
 TOO_WIDE = "too wide an interval: it reaches farther than what is close, and does not exclude it"
 PAPER_TOO_WIDE = "the paper's own interval reaches farther than what is close, so no run can decide"
 ONE_REPEAT = "one repeat, so no interval"
-LOWER_BOUND = "some repeats ended before they were done, so the mean is a lower bound; it takes a larger pool, not more seeds"
+LOWER_BOUND = (
+    "some repeats ended before they were done, so the mean is a lower bound; it takes a larger pool, not more seeds"
+)
 COMPARISON_COLUMNS = (
     *("table", "row", "column", "statistic", "unit", "published", "upper", "decimals"),
     *("paper_low", "paper_high", "deviation", "reproduced", "ci_low", "ci_high", "cluster_low", "cluster_high"),

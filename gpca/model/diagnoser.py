@@ -163,8 +163,8 @@ class Diagnoser:
         enactments = reenact(pair, self.reenactment, self.truth, surface)
         row = row_of(enactments, pair, self.reenactment, self.truth)
         reenacted = Reenacted.of(enactments, row["weight"][: len(enactments)], T_icp, surface)
-        # A partial target has open ends, too, but of 56 right results at which 30 % of it were missing, none was given a
-        # wrong scale; with open ends, four more would be called free in some direction.
+        # A partial target has open ends, too. But of 56 right results that lacked 30 % of it, none had a wrong scale;
+        # with open ends, four more would be called free in some direction.
         reenacted = reenacted.with_fit(observed, T_icp, surface, open_ends=False)
         distance_K = enactments[0].errors(T_icp @ inverses(row["T_model_observed"]))
         evidence = Evidence(distance_K[None], row["weight"][None], pair.inlier_rmse_n[:1], pair.fitness_n[:1])

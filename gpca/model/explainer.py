@@ -111,12 +111,10 @@ class Explainer:
             InputError: too few points with a measurement, implausible units, very different sizes, an initial pose that
                 is not rigid, unknown method or estimator, missing package, or an estimator that has to be trained.
         """
-        started = perf_counter()
-        seconds: dict[str, float] = {}
-        notes: list[str] = []
+        began, seconds, notes = perf_counter(), dict[str, float](), list[str]()
         inputs = (source_points, target_points, T_target_source_init, unit, frame)
         clouds, limit, outcome = self._registered(inputs, source_unit, tolerance, method, register, notes, seconds)
-        T_found = outcome.T_target_source
+        T_found, started = outcome.T_target_source, register and T_target_source_init is not None
         voids = voids_of(clouds.source, clouds.target, outcome.fitness, self.model.familiar)
         diagnosis = None
         enactments: list[Enactment] = []
@@ -144,16 +142,9 @@ class Explainer:
                     f"the pair is {diagnosis.unlikeness:.1f} times as far from the registrations that the diagnosis "
                     "was trained on as 99 % of these are from one another"
                 )
-            if (
-                T_target_source_init is not None
-                and method is None
-                and register
-                and self._fits_inverted(clouds, outcome)
-            ):
+            if started and method is None and self._fits_inverted(clouds, outcome):
                 warnings.append("the inverse of the initial pose fits far better: is it T_source_target?")
-        moved = None
-        if register and T_target_source_init is not None:
-            moved = Motion.of(T_found, clouds.source, clouds.frame.diameter)
+        moved = Motion.of(T_found, clouds.source, clouds.frame.diameter) if started else None
         spread = None
         if uncertainty is not None:
             with _timed(seconds, "uncertainty"):
@@ -161,8 +152,7 @@ class Explainer:
         repaired = None
         if repair:
             with _timed(seconds, "repair"):
-                found = () if fast else enactments
-                by = method if register else GIVEN
+                by, found = method if register else GIVEN, () if fast else enactments
                 repaired = Repair.of(self.model, clouds, outcome, by, limit, unit, found)
         rescale = diagnosis is not None and diagnosis.wrong_scale
         if repaired is not None and repaired.verdict == REPAIRED and not rescale:
@@ -192,7 +182,7 @@ class Explainer:
             spread=spread,
             repaired=repaired and replace(repaired, scene=None),
             unit=unit,
-            seconds=seconds | {"total": perf_counter() - started},
+            seconds=seconds | {"total": perf_counter() - began},
             notes=tuple(notes),
             warnings=tuple(warnings),
             gpca_warnings=tuple(unusual_to_gpca),
