@@ -18,7 +18,7 @@ from gpca.alignment.methods.registry import make_method
 from gpca.causes.settings import MODEL, Moved
 from gpca.model.result import Calibrated, Evidence, ResultJudge
 from gpca.pairs.distances import ObservedPair
-from gpca.reenactment.enactment import completed, observed_at
+from gpca.reenactment.enactment import Stayed
 from gpca.reenactment.hypotheses import (
     FEWEST_INLIERS,
     LAST_ITERATIONS,
@@ -118,7 +118,7 @@ class TruePoses:
     @classmethod
     def of(cls, observed: np.ndarray, surface: ModelSurface, T_K: np.ndarray, weight_K: np.ndarray) -> TruePoses:
         """Return hypotheses (K, 4, 4) of the true pose of observed points (N, 3), and the other estimate."""
-        whole = completed(surface, observed_at(T_K[int(np.argmax(weight_K))], observed, surface))
+        whole = Stayed(T_K[int(np.argmax(weight_K))], observed, surface).whole_surface()
         T_k = np.concatenate([T_K, best_end(observed, surface)[None]])
         return cls(whole, T_k, np.append((1 - OF_ESTIMATE) * weight_K, OF_ESTIMATE))
 
@@ -274,6 +274,6 @@ def unseen(points: np.ndarray, surface: ModelSurface, T: np.ndarray) -> tuple[fl
 
     It is None where they leave out next to nothing.
     """
-    observation = observed_at(T, points, surface)
+    observation = Stayed(T, points, surface).observation()
     missing_M = ~observation.covered
     return observation.outliers, Part.of(surface, missing_M) if missing_M.any() else None

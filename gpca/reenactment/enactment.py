@@ -71,19 +71,25 @@ def observe(
 ) -> Observation:
     """Return what a hypothesis says of the observed points (N, 3)."""
     points = transform(hypothesis.T, observed)
+    is_outlier, is_lone = kinds(points, hypothesis, surface)
+    matched = ~is_outlier & ~is_lone
+    residuals, rows = surface.residuals(points)
+    noise = scale.noise(residuals[matched])
+    covered = covered_points(surface, points[matched], noise, random)
+    return Observation(points, is_outlier, is_lone, noise, residuals, rows, covered)
+
+
+def kinds(points: np.ndarray, hypothesis: Hypothesis, surface: ModelSurface) -> tuple[np.ndarray, np.ndarray]:
+    """Return which points (N, 3) are outliers, and which lie on surface that the model lacks."""
     is_outlier = hypothesis.inlier_N <= 0.5
     fewest = min(len(points), max(FEWEST_INLIERS, len(points) // 2))
     if (~is_outlier).sum() < FEWEST_INLIERS:
         is_outlier = np.ones(len(points), bool)
         is_outlier[np.argsort(-hypothesis.inlier_N, kind="stable")[:fewest]] = False
     is_lone = ~is_outlier & (hypothesis.lone_N > 0.5) & (surface.distances(points) > FAR * hypothesis.width)
-    matched = ~is_outlier & ~is_lone
-    if matched.sum() < FEWEST_INLIERS:
-        is_lone, matched = np.zeros(len(points), bool), ~is_outlier
-    residuals, rows = surface.residuals(points)
-    noise = scale.noise(residuals[matched])
-    covered = covered_points(surface, points[matched], noise, random)
-    return Observation(points, is_outlier, is_lone, noise, residuals, rows, covered)
+    if (~is_outlier & ~is_lone).sum() < FEWEST_INLIERS:
+        is_lone = np.zeros(len(points), bool)
+    return is_outlier, is_lone
 
 
 LEAST_LACKING = 0.05  # share of the points on surface that the model lacks; fewer are none
@@ -130,23 +136,39 @@ def rebuild(T: np.ndarray, observation: Observation, surface: ModelSurface, rand
     )
 
 
-def completed(surface: ModelSurface, observation: Observation) -> ModelSurface:
-    """Return the surface with what was observed of the part that the model lacks, if it lacks any.
+def is_whole(surface: ModelSurface, is_lone: np.ndarray) -> bool:
+    """Return whether next to none of the points (N,) lie on surface that the model lacks.
 
     A symmetric model stays one: what is observed beside it may be another thing.
     """
-    if observation.is_lone.mean() < LEAST_LACKING or surface.symmetric:
+    return bool(is_lone.mean() < LEAST_LACKING) or surface.symmetric
+
+
+def completed(surface: ModelSurface, observation: Observation) -> ModelSurface:
+    """Return the surface with what was observed of the part that the model lacks, if it lacks any."""
+    if is_whole(surface, observation.is_lone):
         return surface
     return surface.completed(observation.points[observation.is_lone], observation.noise)
 
 
-def observed_at(T: np.ndarray, observed: np.ndarray, surface: ModelSurface) -> Observation:
-    """Return what a pose, if it is true, says of observed points (N, 3)."""
-    fits = fits_at(T[None], observed, surface)
-    lone_N, width = fits.lone_n_N[0], float(fits.width_n[0])
-    hypothesis = Hypothesis(T, fits.inlier_n_N[0] + lone_N, float(fits.log_likelihood_n[0]), width, 1, 0, lone_N)
-    random = generator("whole surface")
-    return observe(observed, hypothesis, surface, NoiseScale(surface, random), random)
+class Stayed:
+    """What a pose (4×4), if it is true as it is, says of observed points (N, 3)."""
+
+    def __init__(self, T: np.ndarray, observed: np.ndarray, surface: ModelSurface) -> None:
+        self._observed, self._surface, fits = observed, surface, fits_at(T[None], observed, surface)
+        lone_N, numbers = fits.lone_n_N[0], (float(fits.log_likelihood_n[0]), float(fits.width_n[0]))
+        self._hypothesis = Hypothesis(T, fits.inlier_n_N[0] + lone_N, *numbers, 1, 0, lone_N)
+
+    def observation(self) -> Observation:
+        """Return what it says."""
+        random = generator("whole surface")
+        scale = NoiseScale(self._surface, random)
+        return observe(self._observed, self._hypothesis, self._surface, scale, random)
+
+    def whole_surface(self) -> ModelSurface:
+        """Return the completed surface, by which errors are measured."""
+        _, is_lone = kinds(transform(self._hypothesis.T, self._observed), self._hypothesis, self._surface)
+        return self._surface if is_whole(self._surface, is_lone) else completed(self._surface, self.observation())
 
 
 def fresh_points(surface: ModelSurface, rows: np.ndarray, count: int, random: np.random.Generator) -> np.ndarray:
