@@ -1,30 +1,27 @@
-"""Table X: accuracy under the controls, from each source to each other, with encoders trained otherwise, and costs."""
+"""Table X: accuracy under the controls, from each source to each other, and costs."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from math import inf
 from typing import Any
 
 from gpca.declarations.plan import Run
-from gpca.declarations.result import Figure, Frame, Paths, Series, figure, table
+from gpca.declarations.result import Figure, Frame, Paths, figure, table
 from gpca.errors import InputError
 from gpca.evaluation.intervals import REPEATS
 from gpca.evaluation.measures import ALL, POOLED, source_method_seed, tidy
 from gpca.experiments.cause_tables import rule_near_chance
 from gpca.experiments.controls import AUROC, CALLS, OF_TRIVIAL, RIVAL, SECTION, USUAL
 from gpca.experiments.explained import titles
-from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.registry import explainer_entry
 from gpca.io.csv_file import read_numbers
 from gpca.reporting.figures import style
 from gpca.reporting.figures.style import SMALL_PT
 from gpca.reporting.sheet import Row, Sheet, Show, crossed, show, with_label
-from gpca.reporting.tables.builder import TableBuilder
-from gpca.reporting.tables.cells import cell_of_repeats, interval_cell, plain_cell, rows_where
+from gpca.reporting.tables.cells import cell_of_repeats, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column
 from gpca.reporting.words import plural, span
 from gpca.steps import control_samples as samples_of
-from gpca.steps.control_samples import HARD, PAPER, TRANSFER, UNSEEN, trained_otherwise
+from gpca.steps.control_samples import HARD, PAPER, TRANSFER, UNSEEN
 
 INTERVALS = {"intervals": "control_intervals.csv"}
 TITLES = {
@@ -205,77 +202,6 @@ def loophole(run: Run, intervals) -> Figure:
     legend_below(drawing, handles, labels, columns=2, fontsize=SMALL_PT)
     style.write_title(drawing, "All together" if source == POOLED else run.source_titles[source])
     return drawing
-
-
-TRAINED = {"random_draws": "draws of random size"}
-SAME_SEEDS = "paper_same_seeds"  # the paper's training, over the seeds of the encoders trained in other ways
-OBJECTS = {PAPER: TITLES[PAPER], samples_of.SEEN: "Objects that it learned from (%)", UNSEEN: "Unseen objects (%)"}
-
-
-@table(
-    SECTION,
-    "Table X: encoders trained otherwise",
-    """GP-CA on three encoders: the paper's, one trained on random numbers of points so that density says nothing, and
-    one trained with a head of two layers. Each is tested on new samples of the objects that it learned from, and on
-    unseen objects; the paper's is also shown over the seeds of the others, which are fewer.""",
-    needs=("control_encoder",),
-    **INTERVALS,
-)
-def table10_encoders(run: Run, intervals):
-    builder = TableBuilder("table10_encoders", {"source": "Dataset", "training": "Encoder"})
-    explainers = titles(run.config["controls"]["explainers"])
-    forms = {name: words for name, words in explainers.items() if name in GPCA_FORMS}
-    accuracy = rows_where(intervals, metric="accuracy")
-
-    def by_objects(source: str, method: str, against: str = "") -> dict[str, Series]:
-        rows = rows_where(accuracy, source=source, method=method, against=against).set_index("table")
-        return {objects: rows.loc[objects] for objects in OBJECTS if objects in rows.index}
-
-    for row in crossed(("source", ALL_TOGETHER | run.source_titles), ("method", forms)):
-        (source, explainer), (dataset, (_, words)) = row.where.values(), row.labels
-        paper = by_objects(source, explainer)
-        ways = {
-            way: [by_objects(source, trained_otherwise(explainer, way), against) for against in ("", USUAL)]
-            for way in samples_of.TRAININGS
-        }
-        cells = {objects: interval_cell(row) for objects, row in paper.items()}
-        builder.add_row([dataset, (PAPER, _with_seeds(words, paper.values()))], cells)
-        # The paper's training over the seeds of the other trainings, where these are fewer: their values less changes.
-        fewer = {
-            objects: (row, changes[objects])
-            for rows, changes in ways.values()
-            for objects, row in rows.items()
-            if objects in paper and row["seeds"] < paper[objects]["seeds"]
-        }
-        same = {
-            objects: plain_cell(100 * (row["value"] - change["value"]), int(row["seeds"]), int(row["samples"]))
-            for objects, (row, change) in fewer.items()
-        }
-        builder.add_row([dataset, (SAME_SEEDS, _with_seeds(words, (row for row, _ in fewer.values())))], same)
-        for way, (rows, changes) in ways.items():
-            cells = {objects: interval_cell(row) for objects, row in rows.items()}
-            cells |= {objects + CHANGE: interval_cell(row) for objects, row in changes.items()}
-            builder.add_row([dataset, (way, _with_seeds(f"{words}, {TRAINED[way]}", rows.values()))], cells)
-    return builder.build(
-        caption="Accuracy (%) on encoders that are trained otherwise" + run.stand_ins(),
-        column_head="objects",
-        columns={name: Column(words, interval=False) for name, words in OBJECTS.items()}
-        | {
-            name + CHANGE: Column(f"{words}: change", limits=POINTS, beside=name)
-            for name, words in OBJECTS.items()
-            if name != PAPER
-        },
-        footnotes=(
-            "Except under the paper's protocol, all learn from the same training samples of some of the objects, and "
-            "are asked about new samples of these objects and about the others. In brackets: points gained or lost by "
-            "the training, on the same seeds and test samples, and " + BOOTSTRAP + ".",
-        ),
-    )
-
-
-def _with_seeds(words: str, rows: Iterable[Series]) -> str:
-    seeds = [row["seeds"] for row in rows]
-    return f"{words}, {plural(span(seeds), 'seed')}" if seeds else words
 
 
 SECONDS = {"learning_seconds": 1, "seconds": 1e3}  # column of the files -> factor to the table's unit

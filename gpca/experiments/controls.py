@@ -16,13 +16,12 @@ from gpca.errors import InputError, with_key
 from gpca.evaluation.intervals import TRIVIAL, Clustered, best_of, interval, weighted_mean
 from gpca.evaluation.measures import ALL, POOLED, TEST_SAMPLES, intervals, source_method_seed, tidy
 from gpca.experiments.explained import explainer_settings, require_explained
-from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.interface import BARE, REENACTED
 from gpca.explainers.registry import explainer_entry, explainer_module
 from gpca.io.csv_file import numbers as number_column
 from gpca.settings import changes_of
 from gpca.steps import control_samples as samples
-from gpca.steps.control_samples import HARD, PAPER, RETRAINED, TRAININGS, TRANSFER, UNSEEN, plain_of
+from gpca.steps.control_samples import HARD, PAPER, RETRAINED, TRANSFER
 
 CALLS, AUROC = "icp_calls", "auroc_error"
 SECTION = "Beyond the paper: what explainers look at, and whether it carries over"
@@ -48,14 +47,12 @@ def check(config: dict, _left_out: LeftOut) -> None:
 
 
 def names(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Encoders are compared on the samples that the unseen objects need; one source alone admits no transfer."""
+    """One source alone admits no transfer."""
     controls = config["controls"]
-    by_gpca = any(name in GPCA_FORMS for name in controls["explainers"])
     return {
         "control_seed": list(config["seeds"])[: controls["seeds"]],
-        "control": [*RETRAINED, *TRAININGS],
+        "control": list(RETRAINED),
         "control_embedding": config["embedding"]["encoder"],
-        "control_encoder": list(controls["encoders"]) if by_gpca and UNSEEN in controls["controls"] else [],
         "timed_control": [name for name in controls["explainers"] if explainer_entry(name).reads == BARE],
         "transfer_source": list(sources) if TRANSFER in controls["controls"] and len(sources) > 1 else [],
     }
@@ -72,13 +69,13 @@ EXPERIMENT = Experiment(
 
 
 def _controls_of(plan: Plan, wildcards: Wildcards) -> tuple[list[str], list[str]]:
-    """Controls of a seed, and those and the ways of training for which it has encoders of its own.
+    """Controls of a seed, and those for which it has encoders of its own.
 
     Only the first seeds train encoders beyond those of every seed.
     """
     chosen = plan.config["controls"]["controls"]
     if int(wildcards.seed) in plan.names["control_seed"][: plan.config["controls"]["encoder_seeds"]]:
-        return list(chosen), [name for name in chosen if name in RETRAINED] + plan.names["control_encoder"]
+        return list(chosen), [name for name in chosen if name in RETRAINED]
     controls = [name for name in chosen if name in samples.OF_EVERY_SEED or name not in RETRAINED]
     return controls, [name for name in controls if name in RETRAINED]
 
@@ -248,7 +245,7 @@ def collect_intervals(run: Run, files: Paths) -> Frame:
 
     Of transfer there is a row for each source trained on, and one for all others together. Draws of families and seeds
     are the same for all explainers and controls of a source, so that differences are paired. Against ``usual``: the
-    paper's protocol, or the paper's training of the encoder, on the same seeds. Against ``rival`` and ``trivial``:
+    paper's protocol on the same seeds. Against ``rival`` and ``trivial``:
     the best other explainer, and the best trivial one, under the same control. ICP calls are those under
     the paper's protocol.
     """
@@ -257,13 +254,9 @@ def collect_intervals(run: Run, files: Paths) -> Frame:
     records: list[tuple] = []
     for source in (*sources, POOLED) if len(sources) > 1 else sources:
         subset = predictions if source == POOLED else predictions[predictions["source"] == source]
-        measured: dict[tuple[str, str], dict[str, tuple[Values, Clustered, str, Values]]] = {}
+        measured: dict[tuple[str, str], dict[str, tuple[Values, Clustered, Values]]] = {}
         for explainer, rows in subset.groupby("explainer", sort=False):
-            usual, plain = rows, plain_of(str(explainer))
-            draws = usual_draws = Clustered.drawn(rows["seed"], rows["cluster"], "control intervals", source)
-            if plain:
-                usual = subset[(subset["explainer"] == plain) & subset["seed"].isin(rows["seed"])]
-                usual_draws = Clustered.drawn(usual["seed"], usual["cluster"], "control intervals", source)
+            draws = Clustered.drawn(rows["seed"], rows["cluster"], "control intervals", source)
             masks: dict[tuple[str, str], np.ndarray] = {}  # control, and `all` or the source trained on -> (N,)
             for control in rows["control"].unique():
                 mask_N = (rows["control"] == control).to_numpy()
@@ -272,11 +265,11 @@ def collect_intervals(run: Run, files: Paths) -> Frame:
                         masks[control, other] = mask_N & (rows["trained_on"] == other).to_numpy()
                 masks[control, POOLED if control == TRANSFER else ALL] = mask_N
             for key, mask_N in masks.items():
-                same = (usual["control"] == (key[0] if plain else PAPER)) & usual["seed"].isin(rows["seed"][mask_N])
-                usual_values = _values(usual[same], usual_draws.subset(same.to_numpy()))
+                same = (rows["control"] == PAPER) & rows["seed"].isin(rows["seed"][mask_N])
+                usual_values = _values(rows[same], draws.subset(same.to_numpy()))
                 group_draws = draws.subset(mask_N)
                 group = measured.setdefault(key, {})
-                group[str(explainer)] = _values(rows[mask_N], group_draws), group_draws, plain or PAPER, usual_values
+                group[str(explainer)] = _values(rows[mask_N], group_draws), group_draws, usual_values
         for explainer in subset["explainer"].unique():
             for (control, trained_on), group in measured.items():
                 if explainer in group:
@@ -296,16 +289,16 @@ def _values(rows: Frame, draws: Clustered) -> Values:
 
 def _records(keys: tuple[str, str], trained_on: str, explainer: str, group: Mapping) -> Iterable[tuple]:
     """Rows of an explainer: each measure, and its differences."""
-    values, draws, usual, usual_values = group[explainer]
+    values, draws, usual_values = group[explainer]
     accuracies = {name: measured["accuracy"] for name, (measured, *_) in group.items()}
-    rivals = sorted(name for name in accuracies if name != explainer and not plain_of(name))
+    rivals = sorted(name for name in accuracies if name != explainer)
     for metric, value_B in values.items():
         if not np.isfinite(value_B[0]):
             continue
         row = (*keys, explainer, metric, trained_on)
         drawn_B_N = None if metric == CALLS else draws.weights[1:]
         yield draws.record((*row, "", ""), interval(value_B, drawn_B_N))
-        others = {USUAL: (usual, usual_values[metric])} if keys[0] != PAPER or usual != PAPER else {}
+        others = {USUAL: (PAPER, usual_values[metric])} if keys[0] != PAPER and metric in usual_values else {}
         if metric == "accuracy":
             for kind, candidates in ((RIVAL, rivals), (OF_TRIVIAL, [name for name in TRIVIAL if name in rivals])):
                 if other := best_of(accuracies, candidates):

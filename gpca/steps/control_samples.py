@@ -25,19 +25,16 @@ from gpca.pairs.dataset import Registrations, ragged
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.rigid import inverse
 from gpca.seeds import generator
-from gpca.settings import Bounds, Count, Different, Distinct, read_settings
+from gpca.settings import Bounds, Count, Distinct, read_settings
 
 PAPER = "paper"  # the protocol itself, which every control is compared with
 Control = Literal["density", "unseen_objects", "hard", "reversed", "label_noise_30", "shuffled", "transfer"]
 CONTROLS: tuple[str, ...] = get_args(Control)
 UNSEEN = "unseen_objects"
-SEEN = "seen_objects"  # the explainers for unseen objects, tested on new samples of training objects
 HARD = "hard"  # other samples, in which no state is perfect and the label is measured
 HARD_REENACTMENTS = "hard_reenactments"  # their folder
 RETRAINED = ("density", UNSEEN, HARD)  # have another encoder
 OF_EVERY_SEED = (UNSEEN, HARD)  # with another encoder for every seed
-Training = Literal["random_draws"]
-TRAININGS: tuple[str, ...] = get_args(Training)  # other ways to train the encoder, on the samples for unseen objects
 WRONG_LABELS = {"label_noise_30": 0.3}  # share of the training labels
 RELABELED = (*WRONG_LABELS, "shuffled")
 TRANSFER = "transfer"
@@ -54,7 +51,6 @@ class ControlSettings:
     """The controls, and their sizes.
 
     Attributes:
-        encoders: other ways to train GP-CA's encoder, compared on training objects and on unseen ones.
         encoder_seeds: how many of `seeds`, from the first, train more encoders than those of `OF_EVERY_SEED`.
         seeds: how many of the run's seeds are used, from the first.
         draw_points: range of the random number of points of a cloud where density is matched.
@@ -63,7 +59,6 @@ class ControlSettings:
     """
 
     controls: Distinct[Control] = ("density", "unseen_objects", "label_noise_30", "shuffled", "transfer")
-    encoders: Annotated[tuple[Training, ...], Different(fewest=0)] = ()
     encoder_seeds: Count = 1
     seeds: Count = 3
     draw_points: tuple[Points, Points] = (200, 512)
@@ -76,22 +71,13 @@ class ControlSettings:
             raise InputError("setting draw_points of controls", fault, "swap the two")
 
 
-def trained_otherwise(explainer: str, way: str) -> str:
-    return f"{explainer}_{way}"
-
-
-def plain_of(explainer: str) -> str | None:
-    """Explainer that :func:`trained_otherwise` gave this name; None for one with the paper's training."""
-    return next((explainer.removesuffix(f"_{way}") for way in TRAININGS if explainer.endswith(f"_{way}")), None)
-
-
 def left_out(control: str, registrations: Registrations, settings: ControlSettings, backbone: str) -> str | None:
     """Reason why these registrations, or the backbone of their encoder, do not admit a control; None where they do."""
-    if control in (UNSEEN, *TRAININGS):
+    if control == UNSEEN:
         objects = len({instance_of(name) for name in registrations.object_name.tolist()})
         if objects < FEWEST_OBJECTS:
             return f"it needs at least {FEWEST_OBJECTS} objects, but there are {objects}"
-    if control in ("density", "random_draws"):
+    if control == "density":
         fewest, least = int(np.diff(registrations.offsets).min()), settings.draw_points[0]
         if fewest < least:
             return f"its smallest draw has {least} points, but a cloud has only {fewest}"
@@ -106,7 +92,7 @@ def variant(
     """Samples under a control; controls of labels and transfer leave the registrations as they are."""
     if control == "density":
         return thinned(registrations, settings.draw_points, source, seed)
-    if control in (UNSEEN, *TRAININGS):
+    if control == UNSEEN:
         return of_unseen_objects(registrations, settings.folds, source, seed)
     if control == "reversed":
         from gpca.pairs.synthesis import registered_backwards
@@ -132,7 +118,7 @@ def thinned(registrations: Registrations, points: tuple[int, int], *axes: object
 
 
 def of_unseen_objects(registrations: Registrations, folds: int, source: str, seed: int) -> Registrations:
-    """Training samples of most objects; test samples are those of the same objects, and all of the other objects.
+    """Training samples of most objects; test samples are all of the other objects.
 
     The families of a source's objects are in folds that a file names, or are dealt into `folds` once for all seeds. A
     seed leaves out the fold of its number, so that as many seeds as folds test every object once.
@@ -142,17 +128,12 @@ def of_unseen_objects(registrations: Registrations, folds: int, source: str, see
         families = generator(source, "folds").permutation(np.unique(registrations.cluster))
         is_unseen = np.isin(registrations.cluster, families[seed % folds :: folds])
     train = np.flatnonzero(~is_unseen & (registrations.split == "train"))
-    test = np.concatenate([np.flatnonzero(~is_unseen & (registrations.split == "test")), np.flatnonzero(is_unseen)])
+    test = np.flatnonzero(is_unseen)
     chosen = registrations.subset(np.concatenate([train, test]))
     # Numbered anew, since the test samples come from both splits.
     split = np.repeat(["train", "test"], [len(train), len(test)])
     sample = np.concatenate([chosen.sample[: len(train)], np.arange(len(test))])
     return replace(chosen, split=split, sample=sample)
-
-
-def shows_known_object(registrations: Registrations) -> np.ndarray:
-    """Mask of the samples (S,) that show an object of a family that the training samples show."""
-    return np.isin(registrations.cluster, registrations.cluster[registrations.split == "train"])
 
 
 def relabeled(control: str, train: Registrations, *axes: object) -> Registrations:
@@ -214,11 +195,11 @@ def encode(
     """Arrays of embeddings by an encoder that is trained like the paper's except for the control, and its curve.
 
     With matched density every draw from a cloud, which is whole, has a random number of points. An encoder for unseen
-    objects, or one that is trained in another way, sees no sample of them. Hard samples are of unseen objects already.
+    objects sees no sample of them. Hard samples are of unseen objects already.
     """
     from gpca.encoders.training import embed, train_encoder
 
-    if control in ("density", "random_draws"):
+    if control == "density":
         fewest, most = settings.draw_points
         encoder = replace(encoder, fewest_points=fewest, draw_points=most)
     if control not in ("density", HARD):

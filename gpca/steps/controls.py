@@ -15,7 +15,6 @@ from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import prediction_frame
 from gpca.classifier.scores import Attribution
 from gpca.encoders.registry import EncoderSettings
-from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.interface import BARE, REENACTED, Describing, Encoding, ExplainerEntry, answer_of
 from gpca.explainers.registry import Embed, described_for, make_rivals
 from gpca.io.csv_file import write_csv
@@ -26,7 +25,7 @@ from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.settings import read_settings
 from gpca.steps import control_samples as samples
-from gpca.steps.control_samples import HARD, LABELS, PAPER, RELABELED, RETRAINED, SEEN, TRANSFER, UNSEEN
+from gpca.steps.control_samples import HARD, LABELS, PAPER, RELABELED, RETRAINED, TRANSFER, UNSEEN
 from gpca.steps.diagnosis import with_what_it_reads
 from gpca.uncertainty.designs import evaluate_design
 from gpca.uncertainty.settings import UncertaintySettings
@@ -117,8 +116,7 @@ class ControlRun:
         backbone: that of the encoder.
         uncertainty: settings of Monte-Carlo ICP, for covariances; its ICP is that of the registrations.
         embed: registrations and the name of their source -> embeddings and head's logits by the paper's encoder.
-        embeddings: ``embedding`` and ``head_logits`` by the paper's encoder, and by that of each control that has one,
-            and by those trained in other ways, of the samples of unseen objects.
+        embeddings: ``embedding`` and ``head_logits`` by the paper's encoder, and by that of each control that has one.
         hard: the samples of that control, if it is among them.
     """
 
@@ -173,12 +171,6 @@ class ControlRun:
             if control != TRANSFER:
                 changed = self._changed(control, plain, embeds)
                 frames += self._explained(control, changed, self._tests(control, changed), self.rivals)
-                for way in self.settings.encoders if control == UNSEEN else ():  # encoders that are trained otherwise
-                    if way in self.embeddings:
-                        own = replace(changed, attached={**changed.attached, **self.embeddings[way]})
-                        rivals = {name: rival for name, rival in self.rivals.items() if name in GPCA_FORMS}
-                        forms = {samples.trained_otherwise(name, way): rival for name, rival in rivals.items()}
-                        frames += self._explained(UNSEEN, own, self._tests(UNSEEN, own), forms)
         return pd.concat(frames, ignore_index=True)
 
     def explain_hard(self, name: str) -> tuple[Attribution, float]:
@@ -216,13 +208,8 @@ class ControlRun:
         return embeds
 
     def _tests(self, control: str, changed: Registrations) -> dict[tuple[str, str], Registrations]:
-        """Test samples by control and source; those of training objects are apart."""
-        test = changed.subset(changed.rows("test"))
-        if control != UNSEEN:
-            return {(control, self.source): test}
-        known = samples.shows_known_object(changed)[changed.split == "test"]
-        by_name = {UNSEEN: np.flatnonzero(~known), SEEN: np.flatnonzero(known)}
-        return {(name, self.source): test.subset(rows) for name, rows in by_name.items() if len(rows)}
+        """Test samples by control and source."""
+        return {(control, self.source): changed.subset(changed.rows("test"))}
 
     def _embedded(self, registrations: Registrations, source: str) -> Registrations:
         h_S_d, logits_S_C = self.embed(registrations, source)

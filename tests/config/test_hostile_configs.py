@@ -133,7 +133,6 @@ VALUES = [
     ({"controls": {"controls": ["gravity"]}}, "controls.controls", "gravity"),
     ({"controls": {"controls": []}}, "controls.controls"),
     ({"controls": {"seeds": 0}}, "controls.seeds", "greater than or equal to"),
-    ({"controls": {"encoders": ["bigger"]}}, "controls.encoders", "bigger"),
     ({"controls": {"explainers": {"gpca_pair_dgcnn": {"epochs": 0}}}}, "controls.explainers.gpca_pair_dgcnn", "epochs"),
     ({"encoders": {"dgcnn": {"head": "three_layer"}}}, "encoders.dgcnn.head", "'linear' or"),
     ({"controls": {"folds": 1}}, "controls.folds", "greater than or equal to"),

@@ -113,19 +113,6 @@ def test_a_control_of_some_seeds_is_compared_with_the_same_seeds_of_the_papers_p
     assert density["value"][["", "usual"]].tolist() == pytest.approx([0.7, -0.2])
 
 
-def test_the_change_of_an_encoder_trained_otherwise_is_against_the_papers_training_on_the_same_samples(files, tmp_path):
-    frame = pd.read_csv(files[0], keep_default_na=False)  # of one seed alone
-    added = [("seen_objects", "gpca", 3), ("seen_objects", "gpca_random_draws", 6)]
-    write_csv(files[0], pd.concat([frame, *(said("a", "a", *names) for names in added)]))
-    second = pd.read_csv(files[1], keep_default_na=False)
-    write_csv(files[1], pd.concat([second, said("a", "a", "seen_objects", "gpca", 30)]))
-    rows = rows_of(files, tmp_path / "control_intervals.csv")
-    otherwise = rows.loc["seen_objects", "a", "all", "gpca_random_draws", "accuracy"]
-    assert otherwise["value"][["", "usual"]].tolist() == pytest.approx([0.8, -0.1])
-    assert otherwise.loc["usual", "other"] == "gpca"
-    assert rows.loc[("seen_objects", "a", "all", "gpca", "accuracy", ""), "value"] == pytest.approx(0.45)
-
-
 def test_seconds_are_tidy_by_source_and_explainer(tmp_path):
     path = tmp_path / "timings" / "a" / "controls" / "seed100.csv"
     write_csv(path, pd.DataFrame({"explainer": ["gpca_pair"], "learning_seconds": [2.5], "seconds": [0.01]}))
