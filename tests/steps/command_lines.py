@@ -21,7 +21,7 @@ SHIFT = {
     "samples": 6, "severities": {"noise": [0.03, 0.05], "crop": [0.6, 0.7]}, "held_out_share": 0.5, "train": 9,
     "encoder": {"epochs": 1, "draws": 1}, "neighbours": 3, "shape_points": 16,
 }  # fmt: skip
-CURVE = {"further": 12, "sizes": [20], "orders": 1, "classifier": FEW | {"learning_rate": 0.1}}
+CURVE = {"further": 24, "sizes": [20], "orders": 1, "classifier": FEW | {"learning_rate": 0.1}}
 DESCRIBED = {"starts": 1, "restarts": 2, "icp_points": 64}
 ICP = {"max_iterations": 30}
 CAUSES = {  # of two symmetric objects with few points: only pose errors make them fail
