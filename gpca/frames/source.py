@@ -6,7 +6,7 @@ from pathlib import Path
 from gpca.errors import InputError
 from gpca.frames.bop import scene_files
 from gpca.objects.bop import models_folder
-from gpca.objects.source import data_files, places_of, resolve
+from gpca.objects.source import data_files, places_of, require_patterns, resolve
 
 REAL_WORLD = "real_rgbd"  # the source that the frames of a run are
 VIRTUAL = "virtual_rgbd"  # frames rendered of models of a run's datasets
@@ -19,8 +19,9 @@ def resolve_datasets(datasets: Mapping[str, dict] | None, data_dir: str | None) 
     for name, entry in (datasets or {}).items():
         if entry.get("optional") and not any(path.is_dir() for path in places_of(entry["location"], data_dir)):
             continue
-        of = resolve({"title": name, "kind": "bop", **entry}, data_dir)
-        of["files"] = patterns(entry.get("split", "test"))
+        files = patterns(entry.get("split", "test"))
+        require_patterns(files)
+        of = resolve({"title": name, "kind": "bop", **entry}, data_dir) | {"files": files}
         results = of.get("results") or []
         named = [results] if isinstance(results, str) else results
         of["results"] = [str(path) for pattern in named for path in _matching(data_dir, pattern)]

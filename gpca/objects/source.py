@@ -6,7 +6,7 @@ folder)`` it can refuse an entry when a workflow loads. Plugins list kinds in ``
 
 import errno
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -57,14 +57,7 @@ def resolve(entry: dict, data_dir: str | None) -> dict:
     if entry.get("objects") and entry["kind"] in set(KINDS).difference(NUMBERED):
         raise InputError("objects", f"are ids, which the kind {entry['kind']} has not", "leave it out, or use files")
     location, patterns = require_place(entry.get("location") or ""), entry.get("files") or ()
-    for pattern in patterns:
-        remedy = "give one relative to location"
-        if ".." in Path(pattern).parts:
-            raise InputError(f"pattern '{pattern}'", "leads out of location", remedy)
-        try:
-            next(Path(os.devnull).glob(pattern), None)  # nothing is below that, but the pattern is looked at
-        except (ValueError, IndexError, NotImplementedError) as fault:
-            raise InputError(f"pattern '{pattern}'", f"finds no files ({fault})", remedy) from fault
+    require_patterns(patterns)
     for base in folders_of_data(data_dir) if entry.get("location") or patterns else ():
         if not (folder := require_place(base / location)).exists():
             continue
@@ -86,6 +79,18 @@ def resolve(entry: dict, data_dir: str | None) -> dict:
         message = f"has {len(urls)} url(s) but {len(checksums)} sha256 value(s)"
         raise InputError(subject, message, "give one for each, or null")
     return {**entry, "origin": "download"}
+
+
+def require_patterns(patterns: Iterable[str]) -> None:
+    """Raise an InputError for a pattern that could find no files below a location."""
+    remedy = "give one relative to location"
+    for pattern in patterns:
+        if ".." in Path(pattern).parts:
+            raise InputError(f"pattern '{pattern}'", "leads out of location", remedy)
+        try:
+            next(Path(os.devnull).glob(pattern), None)  # nothing is below that, but the pattern is looked at
+        except (ValueError, IndexError, NotImplementedError) as fault:
+            raise InputError(f"pattern '{pattern}'", f"finds no files ({fault})", remedy) from fault
 
 
 def require_no_root(folder: Path) -> None:
