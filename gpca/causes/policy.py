@@ -17,8 +17,6 @@ from gpca.settings import NotNegative, Share
 
 NOTHING = "nothing"  # branch of a good registration
 QUEUE = "queue"  # branch in which a person labels the case for the classifier
-DOUBTED, DRAWN = "queued", "random"  # which cases are labeled next: those in doubt, or any
-QUEUE_COLUMNS = ("policy", "order", "draw", "labels", "failures", "unsolved")
 TREATMENTS = {"noise": "denoise", "pose": "reinitialize", "overlap": "new_view"}  # as in the paper
 
 

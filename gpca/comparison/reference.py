@@ -40,7 +40,7 @@ KINDS = tuple(  # file, metric or column, kind of value; the first that fits
         ("*", "kl_* nne* nees* *nll* *elbo*", "nats"),
         ("tables/table12_*", "auroc_failed lead", "share"),
         ("*", _COUNTS, "count"),
-        ("*recovery.csv", "episodes tries acted_first actions nominal failures_at_*", "count"),
+        ("*recovery.csv", "episodes tries acted_first actions nominal", "count"),
         ("tables/table5_*", "*aurc augrc brier", "share"),
         ("tables/*", "ece* nominal_calibration", "share"),
         ("tables/*", "*", "percent"),

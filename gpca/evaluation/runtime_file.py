@@ -17,7 +17,6 @@ COMPONENTS = {  # what the table calls them, in its order
     "explanation": "One explanation",
     "explanation_512": "One explanation, 512 points",
 }
-OF_ONE_EXPLANATION = ("icp", "features", "sampling", "scores")
 
 
 def read_runtime(path: str | Path) -> Frame:

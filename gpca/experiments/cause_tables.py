@@ -6,21 +6,18 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from gpca.causes.judged import BINS, CEILING, joined, read_judged
+from gpca.causes.judged import CEILING
 from gpca.causes.settings import CauseSettings
-from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.declarations.plan import Run
 from gpca.declarations.result import Frame, figure, table
 from gpca.evaluation.intervals import REPEATS
 from gpca.evaluation.measures import POOLED
 from gpca.experiments.cause_figures import draw_causes_example, draw_failures
 from gpca.experiments.confusions import draw_confusions
-from gpca.experiments.diagnosis import CAUSES_FILES, DIAGNOSES, cause_costs, cause_titles
+from gpca.experiments.diagnosis import cause_costs, cause_titles
 from gpca.explainers.interface import WORDS
 from gpca.objects.entry import dataset_of
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.figures.panels import in_lines
-from gpca.reporting.figures.reliability import reliability_figure
 from gpca.reporting.sheet import Row, Sheet, crossed, show, where, with_label
 from gpca.reporting.tables.cells import interval_cell, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column
@@ -234,27 +231,3 @@ def cause_confusions(run: Run, metrics):
 
 
 COMPARED = ("gpca", "gpca_pair", "reenact", "reenact_committee")  # the first of the figures
-
-
-@figure(
-    SECTION,
-    "When it says that nothing is wrong",
-    """Share of the test registrations that are nominal, over the explainer's score of "nominal", for all datasets and
-    seeds together and without borderline registrations. On the diagonal, a score of 0.8 means that nothing is wrong
-    in 80 % of the cases. The number is the calibration error of them all (pooled ECE), and vertical lines are Wilson's
-    intervals (95 %) of independent samples.""",
-    judged=(read_judged, {"prediction_files": DIAGNOSES, "causes_files": CAUSES_FILES}),
-)
-def nominal_reliability(run: Run, judged):
-    titles, samples, sources = run.source_titles, {}, set()
-    explainers = cause_titles(run.config)
-    shown = [name for name in COMPARED if name in explainers] or list(explainers)[: len(COMPARED)]
-    for explainer in shown:
-        parts = {key: each for key, each in judged.items() if key[1] == explainer and key[0] in titles}
-        if parts:
-            together = joined(parts.values())
-            labeled_S = together.label != BORDERLINE
-            samples[in_lines(explainers[explainer])] = together.nominal[labeled_S], together.label[labeled_S] == NOMINAL
-            sources |= {source for source, _, _ in parts}
-    title = ", ".join(title for name, title in titles.items() if name in sources)
-    return reliability_figure(samples, title, BINS, 'score of "nominal"', "share", "share that is nominal")

@@ -169,7 +169,6 @@ LOOKS = {"rule": "black", "gpca": style.BLUE, "gpca_pair": style.GREEN, "pair_fo
     "Who passes when the shortcuts are closed",
     """Accuracy over all sources under the paper's protocol, on unseen objects, on a source that nothing was learned
     from, and on hard samples, with 95 % intervals over objects and seeds. The dotted line is chance.""",
-    after="severity_curves",
     **INTERVALS,
 )
 def loophole(run: Run, intervals) -> Figure:

@@ -60,7 +60,7 @@ def names(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str
 
 EXPERIMENT = Experiment(
     name="controls",
-    beside=("control_tables", "severity_curves"),
+    beside=("control_tables",),
     sections={"controls": Section},
     names=names,
     check=check,
@@ -141,7 +141,6 @@ EXPLAIN = Step(
     name="explain_controls",
     run="gpca.steps.controls:explain",
     inputs={
-        "objects": "objects/{source}.npz",
         "registrations": SEED_FILE,
         "other_registrations": lambda plan, wildcards: [
             f"registrations/{name}/seed{{seed}}.npz" for name in _other_sources(plan, wildcards)
@@ -158,7 +157,6 @@ EXPLAIN = Step(
     },
     outputs={
         "predictions": "controls/{source}/seed{seed}.csv",
-        "samples": "control_samples/{source}/seed{seed}.csv",
         "timings": "timings/{source}/controls/seed{seed}.csv",
     },
     settings=lambda plan, wildcards: (

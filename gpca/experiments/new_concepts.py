@@ -10,7 +10,7 @@ from gpca.causes.drawing import apportion
 from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
 from gpca.declarations.experiment import Experiment
 from gpca.declarations.plan import Run
-from gpca.declarations.result import Figure, Frame, Paths, figure, numbers, table
+from gpca.declarations.result import Frame, Paths, numbers, table
 from gpca.declarations.step import Plan, Step
 from gpca.encoders.registry import encoder_module
 from gpca.evaluation.measures import ALL, read_all_metrics
@@ -19,7 +19,6 @@ from gpca.experiments.active_learning import learning_settings
 from gpca.experiments.concept_attribution import PREDICTIONS, collect_intervals
 from gpca.experiments.label_curves import COUNT, Clusters, quantity
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.figures.style import BLUE, GRAY, GREEN, SKY_BLUE, VERMILION
 from gpca.reporting.sheet import Row, Sheet, Show, crossed
 from gpca.reporting.tables.builder import cautious_over
 from gpca.reporting.tables.cells import cell_of_repeats, clustered_cell, plain_cell, rows_where, where
@@ -233,47 +232,6 @@ def table15_oracle(run: Run, metrics: Frame, clusters: Clusters) -> Table:
     )
     stand_ins = run.stand_ins(partly=False)
     return sheet.table(caption + stand_ins, "quantity", notes, bold=columns, same=2, keep_empty=True)
-
-
-FIGURE_ROWS = {"concepts": CONCEPTS, "nominal": ("nominal",), "geometry": ("geometry",)}
-FIGURE_TITLES = {"concepts": "new: noise, pose\nor overlap", "nominal": "new: nominal", "geometry": "new: geometry"}
-STYLES = {
-    "pretrained": (GRAY, "-", 0.9),
-    "other_samples": (BLUE, "-", 0.9),
-    "other_source": (SKY_BLUE, "-", 0.9),
-    "unseen": (VERMILION, "-", 1.8),
-    "pair": (GREEN, "-", 1.8),
-}
-
-
-def read_curves_by_concepts(files: Paths) -> dict[tuple[str, str, str], Frame]:
-    files = list(files)
-    return {
-        (source, row, setting): curve
-        for row, concepts in FIGURE_ROWS.items()
-        for (source, strategy, setting), curve in labeled.mean_curves(files, concepts).items()
-        if strategy == PAPERS
-    }
-
-
-@figure(
-    SECTION,
-    "Learning curves without leakage",
-    """Accuracy over the number of labels chosen by BALD with k-means, by what the encoder learned from: the mean over
-    the seeds, and in the first row over three concepts. Bands are 95 % intervals over the seeds, of the two thick
-    curves alone; one without a band is of one seed.""",
-    only={"pool_strategy": (PAPERS,)},
-    curves=(
-        read_curves_by_concepts,
-        (
-            "active_learning/{source}/{pool_strategy}/seed{new_concept_seed}.csv",
-            "new_concepts/{source}/{pool_strategy}/seed{new_concept_seed}.csv",
-        ),
-    ),
-)
-def new_concept_curves(run: Run, curves: Mapping[tuple[str, str, str], Frame]) -> Figure:
-    target = run.config["active_learning"]["target"]
-    return labeled.draw_curves(curves, run.source_titles, FIGURE_TITLES, SEEN, STYLES, target)
 
 
 def tests_with_causes(run: Run) -> dict[str, int]:

@@ -141,9 +141,6 @@ EXPERIMENT = Experiment(
     name="recovery",
     beside=("recovery_measures", "recovery_example", "recovery_curves"),
     sections={"recovery": Section},
-    names=lambda config, sources: {
-        "learning_policy": [name for name, each in _entries(config).items() if each.learns or each.queues]
-    },
     check=check,
     optional_entries={"recovery.actions": Names("action", lambda: ACTIONS)},
     switches={"recovery.policies": Names("policy", lambda: policies(tuple(ACTIONS)))},
@@ -165,7 +162,6 @@ RECOVER = Step(
     data=lambda plan, _wildcards: data_files(standing(plan)),
     outputs={
         "rows": "recovery/seed{seed}.csv",
-        "queue": "recovery/queue_seed{seed}.csv",
         "policy": "recovery/policy_seed{seed}.json",
         "example": "recovery/example_seed{seed}.npz",
         "timings": "timings/recovery/seed{seed}.csv",

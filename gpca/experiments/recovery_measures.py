@@ -1,17 +1,17 @@
 """Measures of policies of recovery: by seed, over all seeds with intervals, and their paired differences."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from gpca.causes.policy import NOTHING, QUEUE, QUEUE_COLUMNS
+from gpca.causes.policy import NOTHING, QUEUE
 from gpca.declarations.plan import Run
 from gpca.declarations.result import Frame, Paths, Series, numbers
-from gpca.evaluation.intervals import Clustered, wilson_interval
+from gpca.evaluation.intervals import Clustered
 from gpca.evaluation.measures import ALL, Measure, by_value, intervals, over_seeds, tidy
 from gpca.io.csv_file import numbers as number_column
-from gpca.io.csv_file import read_csv, read_numbers
+from gpca.io.csv_file import read_csv
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.policies import ERROR_ONLY, is_fixed, policy_entry
 from gpca.seeds import seed_of_file
@@ -21,7 +21,6 @@ ERRORS = ("error_before", "error_after")
 RECOVERY_COLUMNS = ("episode", "cause", "table", "policy", "step", "action", "failed", *ERRORS, "recovered", "tries")
 CASE = ["seed", "table", "episode"]
 FIRST = "first_"  # with an action or the queue behind it, a metric of the confusion
-AT = "_at_"  # with a limit in % of the diameter behind it, by which a pose is right in place of the run's own
 WEIGHTS = {"wrong_first": "acted_first", "acted_nominal": "nominal", "cost_nominal": "nominal"}
 SEQUENCE, ERROR = "sequence", "error"  # kinds of rivals
 FILES = "recovery/seed{seed}.csv"
@@ -45,7 +44,7 @@ def is_action(rows: Frame) -> Series:
 @numbers("recovery.csv", files=FILES)
 def collect(run: Run, files: Paths) -> Frame:
     """Measures by policy, cause and seed; results/README.md lists them."""
-    recovery, curve = run.config["recovery"], run.config["success"]["curve"]
+    recovery = run.config["recovery"]
     treatments, costs, budget = dict(recovery["treatments"]), dict(recovery["costs"]), recovery["loop"]["budget"]
     records = []
     for path in files:
@@ -56,7 +55,6 @@ def collect(run: Run, files: Paths) -> Frame:
                 if not subset["failed"].any():
                     continue
                 values = policy_metrics(subset, treatments, costs, budget)
-                values |= metrics_at(subset, budget, curve) if cause == ALL else {}
                 keys, seed = (TABLE, TABLE, policy), rows["seed"].iloc[0]
                 records += [(*keys, metric, cause, seed, float(value)) for metric, value in values.items()]
     return tidy(records, "recovery")
@@ -92,32 +90,9 @@ def policy_metrics(
     return values | {FIRST + action: counts.get(action, 0) for action in (*treatments.values(), QUEUE)}
 
 
-def metrics_at(rows: Frame, budget: int, curve: Iterable[float]) -> dict[str, float]:
-    """Shares recovered by other limits of a right pose, of the failures by each; lower bounds by narrower ones."""
-    rows = rows[rows["failed"]]
-    first = rows[rows["step"] == 1]
-    values: dict[str, float] = {}
-    for limit in curve:
-        failures = first[first["error_before"] >= limit]["episode"]
-        values[at("failures", limit)] = len(failures)
-        if not len(failures):
-            continue
-        right = rows[rows["episode"].isin(failures) & (rows["error_after"] < limit)]
-        for k in range(1, budget + 1):
-            solved = right[right["step"] <= k]["episode"].nunique()
-            values[at(f"recovered_within_{k}", limit)] = solved / len(failures)
-    return values
-
-
-def at(metric: str, limit: float) -> str:
-    """Name of a metric by another limit of a right pose, such as ``failures_at_5`` for 5 %."""
-    return f"{metric}{AT}{100 * limit:g}"
-
-
 def pool_share(metrics: Frame, policy: str, metric: str, concept: str = ALL) -> tuple[float, int] | None:
     """Share over the failures of all seeds, or what `WEIGHTS` names, and their number; None where there is none."""
-    limit = metric.partition(AT)[2]
-    weight = f"failures{AT}{limit}" if limit else WEIGHTS.get(metric, "episodes")
+    weight = WEIGHTS.get(metric, "episodes")
     rows = metrics[(metrics["method"] == policy) & (metrics["concept"] == concept)]
     share_R, count_R = (rows[rows["metric"] == name].set_index("seed")["value"] for name in (metric, weight))
     if share_R.empty:
@@ -187,22 +162,6 @@ def collect_differences(run: Run, files: Paths) -> Frame:
 def steps_taken(failures: Frame) -> Series:
     """Number of actions after which a row's failure was recovered, or inf."""
     return failures["step"].where(failures["recovered"], np.inf)
-
-
-def read_queues(files: Paths) -> Frame:
-    """``policy, order, labels, failures, error, low, high``: shares of the failures at labels that every seed has."""
-    import pandas as pd
-
-    parts = []
-    for path in files:
-        rows = read_numbers(path, QUEUE_COLUMNS, QUEUE_COLUMNS[2:])
-        mean = rows.groupby(["policy", "order", "labels"], sort=False)[["failures", "unsolved"]].mean()
-        parts.append(mean.reset_index())
-    grouped = pd.concat(parts).groupby(["policy", "order", "labels"], sort=False)
-    together = grouped[["failures", "unsolved"]].sum()[grouped.size() == len(parts)].reset_index()
-    shares = [wilson_interval(row.unsolved, int(row.failures)) for row in together.itertuples()]
-    together[["low", "high"]] = pd.DataFrame(shares, index=together.index)
-    return together.assign(error=together["unsolved"] / together["failures"]).drop(columns="unsolved")
 
 
 def _read_all(files: Paths) -> Frame:

@@ -1,10 +1,9 @@
-"""Samples of the controls: registrations as each control changes them, their severities, and encoders trained on them.
+"""Samples of the controls: registrations as each control changes them, and encoders trained on them.
 
 Step ``train_control``: registrations -> embeddings by an encoder that is trained under a control.
 """
 
 import sys
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
@@ -16,14 +15,12 @@ from gpca.encoders.registry import OF_ANY_SIZE, EncoderSettings
 from gpca.errors import InputError
 from gpca.io.arrays import save_arrays
 from gpca.io.csv_file import write_csv
-from gpca.io.frame import Frame
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
-from gpca.objects.canonical import ObjectClouds, unseen
+from gpca.objects.canonical import unseen
 from gpca.objects.surface import instance_of
 from gpca.pairs.dataset import Registrations, ragged
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.rigid import inverse
 from gpca.seeds import generator
 from gpca.settings import Bounds, Count, Distinct, read_settings
 
@@ -39,8 +36,6 @@ WRONG_LABELS = {"label_noise_30": 0.3}  # share of the training labels
 RELABELED = (*WRONG_LABELS, "shuffled")
 TRANSFER = "transfer"
 FEWEST_OBJECTS = 5  # instances; with fewer, too few objects are left to learn from
-SEVERITIES = ("noise", "rotation_deg", "translation", "crop")
-SAMPLE_COLUMNS = ("control", "sample", "object", "concept", *SEVERITIES, "error")
 LABELS = ("control", "tested", "explainer")  # columns before those of a prediction file
 CURVE = ("epoch", "learning_rate", "loss", "accuracy")  # of training
 Points = Annotated[int, Bounds(minimum=32, maximum=65536)]
@@ -55,7 +50,6 @@ class ControlSettings:
         seeds: how many of the run's seeds are used, from the first.
         draw_points: range of the random number of points of a cloud where density is matched.
         folds: of a source's objects, of which one is unseen.
-        bins: of each severity, equally wide.
     """
 
     controls: Distinct[Control] = ("density", "unseen_objects", "label_noise_30", "shuffled", "transfer")
@@ -63,7 +57,6 @@ class ControlSettings:
     seeds: Count = 3
     draw_points: tuple[Points, Points] = (200, 512)
     folds: Annotated[int, Bounds(minimum=2, maximum=5)] = 3
-    bins: Annotated[int, Bounds(minimum=2, maximum=20)] = 4
 
     def __post_init__(self) -> None:
         if self.draw_points[0] > self.draw_points[1]:
@@ -155,32 +148,6 @@ def relabeled(control: str, train: Registrations, *axes: object) -> Registration
         numbers = np.array([CONCEPTS.index(name) for name in concept[rows]], int)
         concept[rows] = np.array(CONCEPTS)[(numbers + steps) % len(CONCEPTS)]
     return replace(train, concept=concept)
-
-
-def sample_table(tested: Mapping[str, Registrations], objects: ObjectClouds) -> Frame:
-    """`SAMPLE_COLUMNS` of the test samples of each control; the error is the final ADD, or ADD-S, in diameters."""
-    import pandas as pd
-
-    from gpca.causes.measuring import read_subjects
-
-    subjects = {subject.name: subject for subject in read_subjects(objects)}
-    frames = []
-    for control, registrations in tested.items():
-        rows = registrations.rows("test")
-        errors = []
-        for row in rows:
-            left = registrations.T_target_source("icp", row) @ inverse(registrations.T_target_source("true", row))
-            errors.append(subjects[str(registrations.object_name[row])].errors(left[None])[0])
-        severities = (
-            registrations.severity_noise,
-            np.rad2deg(registrations.severity_rotation_rad),
-            registrations.severity_translation,
-            registrations.severity_crop,
-        )
-        named = (registrations.sample, registrations.object_name, registrations.concept)
-        columns = (control, *(column[rows] for column in (*named, *severities)), errors)
-        frames.append(pd.DataFrame(dict(zip(SAMPLE_COLUMNS, columns, strict=True))))
-    return pd.concat(frames, ignore_index=True)
 
 
 def encode(

@@ -20,7 +20,6 @@ from gpca.explainers.registry import Embed, described_for, make_rivals
 from gpca.io.csv_file import write_csv
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
-from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.settings import read_settings
@@ -47,9 +46,9 @@ def explain(job: Job) -> None:
     retrained = dict(zip(job.retrained, job.retrained_embeddings, strict=True))
     others = dict(zip(job.others, job.other_registrations, strict=True))
     axes = (job.source, job.seed)
-    inputs = [job.objects, job.registrations, job.encoder, job.embeddings]
+    inputs = [job.registrations, job.encoder, job.embeddings]
     inputs += [*retrained.values(), *others.values(), *job.get("hard", []), *job.get("hard_reenactments", [])]
-    with record_provenance([job.predictions, job.samples, job.timings], inputs, job.settings, seed=job.seed):
+    with record_provenance([job.predictions, job.timings], inputs, job.settings, seed=job.seed):
         registrations = Registrations.load(job.registrations, axes)
         hard = next((Registrations.load(path, axes) for path in job.get("hard", [])), None)
         embeddings = {PAPER: read_embedding(job.embeddings, registrations, logits=True)}
@@ -74,9 +73,7 @@ def explain(job: Job) -> None:
         rows = experiment.run(
             registrations, {name: Registrations.load(path, (name, job.seed)) for name, path in others.items()}
         )
-        tested = {PAPER: registrations} | ({HARD: hard} if hard else {})
         write_csv(job.predictions, rows)
-        write_csv(job.samples, samples.sample_table(tested, ObjectClouds.load(job.objects, job.source)))
         write_csv(job.timings, experiment.costs.rows())
 
 

@@ -36,8 +36,6 @@ from gpca.recovery.loop import Loop, Reenactor, calibrated_alarm
 from gpca.recovery.policies import Means, PolicyEntry, policy_entry
 from gpca.recovery.rehearsal import (
     Rehearsal,
-    error_by_labels,
-    learners_of,
     rehearse,
     rehearsed_gate,
     rehearsed_order,
@@ -63,7 +61,7 @@ def run(job: Job) -> None:
     objects = resolve(dict(settings.objects), job.data_dir)
     actions = {name: action_of(name, of_action or {}) for name, of_action in recovery["actions"].items()}
     entries = [policy_entry(name, tuple(actions)) for name in recovery["policies"]]
-    outputs = [job.rows, job.timings, job.queue, job.policy, job.example]
+    outputs = [job.rows, job.timings, job.policy, job.example]
     axes = (SOURCE, job.seed)
     with record_provenance(outputs, data_files(objects), job.settings, seed=job.seed):
         tables = lay_tables(surfaces(objects, job.downloads), settings, *axes)
@@ -95,10 +93,6 @@ def run(job: Job) -> None:
         rows, seconds = Loop(episodes, actions, explainers.explain, means, loop, axes, reenactor).run(
             recovery["policies"]
         )
-        judged = [episode for episode in episodes if episode.failed]
-        solved = [{name: episode.solved_by((name,), actions, loop) for name in actions} for episode in judged]
-        learners = learners_of(recovery["policies"], means, rehearsal, judged, explainers, loop.budget)
-        write_csv(job.queue, error_by_labels(learners, solved, rehearsal, axes))
         write_csv(job.rows, rows)
         write_csv(job.timings, seconds)
         views = recovery["actions"].get(ACTION) or {}

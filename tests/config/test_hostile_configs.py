@@ -97,7 +97,6 @@ def learner(**settings):
 
 
 VALUES = [
-    ({"controls": {"bins": 1}}, "controls.bins"),
     ({"scans": {"datasets": {"mine": {"title": "t", "kind": "npz", "location": "/"}}}}, "is the root of the file"),
     (source(location="/"), "sources.mine", "is the root of the file system"),
     (source(files=["*.none"]), "sources.mine", "*.none: no file matches"),

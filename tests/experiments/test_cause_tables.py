@@ -7,9 +7,7 @@ from gpca.causes.judged import CEILING
 from gpca.errors import InputError
 from gpca.evaluation.measures import AGAINST, KEYS, NUMBERS, POOLED
 from gpca.experiments import cause_tables
-from gpca.experiments.cause_tables import nominal_reliability
 from tests.experiments.runs import run_with
-from tests.judged import random_judged
 
 SOURCES = {"ycb": {"title": "YCB", "stand_in": True}}
 TITLES = {"good": "Good", "poor": "Poor", "gate": "Gate"}
@@ -113,9 +111,3 @@ def test_how_near_to_chance_the_rule_is_among_the_failed_is_said(intervals, titl
         0.4
     )
     assert "| Dominant (%), chance 33.3 |" in text_of(0.36) and "| 36.0 (26.0 to 41.0) |" in text_of(0.36)
-
-
-def test_the_figure_of_reliability_is_the_same_bytes_each_time(titles, same_bytes):
-    titles["absent"] = "Absent"
-    judged = {("ycb", "good", seed): random_judged(seed=seed) for seed in (100, 101)}
-    same_bytes(lambda: nominal_reliability(run_with(sources=SOURCES), judged))

@@ -180,11 +180,11 @@ def test_csv_and_page_have_the_numbers_and_words_of_the_table(metrics, tmp_path)
     assert (float(gpca["ci_low"]), float(gpca["ci_high"])) == (94, 99)
     assert (gpca["n_seeds"], gpca["n_test"]) == ("3", "600")
     assert len(rows) == 3
-    assert (tmp_path / "t.md").read_text(encoding="utf-8").startswith("**Mean accuracy")
+    assert (tmp_path / "t.md").read_text(encoding="utf-8").startswith("**Table I: Mean accuracy")
     table = made(table1_single_baselines, metrics)
     table.write(tmp_path / "t")
     printed = json.loads((tmp_path / "t.json").read_text(encoding="utf-8"))
-    assert (printed["caption"], printed["label_columns"]) == (table.caption, 1)
+    assert (printed["caption"], printed["label_columns"]) == (f"Table I: {table.caption}", 1)
     assert printed["footnotes"] == [*table.footnotes]
     assert printed["heads"][0] == "Dataset"
     [row, *_] = printed["rows"]

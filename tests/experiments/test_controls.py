@@ -1,23 +1,18 @@
 """From predictions under the controls to metrics, intervals and severities."""
 
-from dataclasses import replace
-
 import numpy as np
 import pandas as pd
 import pytest
 
 from gpca.declarations.plan import Run
 from gpca.evaluation.measures import POOLED, read_clustered, write_metrics
-from gpca.experiments import severity_curves
 from gpca.experiments.control_tables import read_costs
 from gpca.experiments.controls import collect, collect_intervals, read_controls
-from gpca.experiments.severity_curves import REGISTRATION, read_severities
 from gpca.io.csv_file import write_csv
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.steps.control_samples import LABELS, sample_table
+from gpca.steps.control_samples import LABELS
 
-SEVERITIES = {"noise": [0.01, 0.03], "rotation_deg": [15, 60], "translation": [0.05, 0.30], "crop": [0.2, 0.6]}
-RUN = Run({"registrations": {"severities": SEVERITIES}, "controls": {"bins": 2}, "success": {"error": 0.02}})
+RUN = Run({})
 
 
 def rows_of(files, path):
@@ -121,45 +116,3 @@ def test_seconds_are_tidy_by_source_and_explainer(tmp_path):
         ("a", "gpca_pair", "learning_seconds", 100): 2.5,
         ("a", "gpca_pair", "seconds", 100): 0.01,
     }
-
-
-def severity_files(folder, paths, **changed):
-    """The severities of the test samples: pose errors of the first half of the range, noise of all of it."""
-    written = []
-    for path in paths:
-        number = np.arange(30)
-        concept = np.array(CONCEPTS)[number % 3]
-        columns = {"control": "paper", "sample": number, "object": "part", "concept": concept}
-        columns |= {"noise": np.where(concept == "noise", np.linspace(0.01, 0.03, 30), 0)}
-        columns |= {"rotation_deg": np.where(concept == "pose", 20.0, 0)}
-        columns |= {"translation": np.where(concept == "pose", np.linspace(0.05, 0.3, 30), 0)}
-        columns |= {"crop": np.where(concept == "overlap", 0.6, 0), "error": np.where(concept == "pose", 0.1, 0.001)}
-        written.append(folder / "control_samples" / path.parent.name / path.name)
-        own = pd.DataFrame(columns | changed)
-        write_csv(written[-1], pd.concat([own, own.assign(control="hard", error=0.1)]))  # has no bins
-    return written
-
-
-def test_success_and_accuracy_stand_in_the_same_bins(files, tmp_path):
-    found = severity_curves.collect(RUN, files, severity_files(tmp_path, files))
-    write_metrics(found, tmp_path / "severities.csv")
-    rows = read_severities(tmp_path / "severities.csv").set_index(["concept", "method"])
-    assert rows.loc[("pose", REGISTRATION)]["value"].tolist() == [0, 0]
-    assert rows.loc[("pose", REGISTRATION)]["other_low"].tolist() == pytest.approx([0.05, 0.175])
-    assert rows.loc[("overlap", REGISTRATION)][["low", "high", "value"]].tolist() == [0.4, 0.6, 1.0]
-    noise = rows.loc[("noise", "gpca")]
-    assert noise["samples"].sum() == 40  # of four files
-    assert (noise["value"] * noise["samples"]).sum() == pytest.approx(36)  # by the paper's protocol alone
-    assert noise["value"].iloc[1] == 1
-
-
-def test_a_perfect_pose_has_no_error(registrations, objects):
-    there = replace(registrations, T_target_source_icp=registrations.T_target_source_true)
-    table = sample_table({"paper": there}, objects)
-    assert len(table) == 18
-    # The error of a symmetric object is to the nearest point, which is the point itself.
-    assert table["error"].max() == pytest.approx(0, abs=1e-9)
-    assert table["rotation_deg"][table["concept"] == "pose"].between(15, 60).all()
-    both = sample_table({"paper": there, "hard": registrations}, objects)
-    assert both["control"].tolist() == ["paper"] * 18 + ["hard"] * 18
-    assert both["error"][18:].max() > 0.001

@@ -9,7 +9,6 @@ from gpca.evaluation.intervals import wilson_interval
 from gpca.evaluation.measures import COLUMNS as INTERVALS
 from gpca.evaluation.measures import TIDY_COLUMNS
 from gpca.experiments import new_concepts
-from tests.figures import words_of
 
 SOURCES = {"ycb": {"title": "YCB", "stand_in": True}}
 SHARES = {"nominal": 0.30, "borderline": 0.16, "noise": 0.18, "pose": 0.18, "overlap": 0.18, "geometry": 0}
@@ -118,20 +117,3 @@ def test_accuracies_have_the_interval_of_families_even_of_few_seeds(metrics):
 def test_without_these_sources_there_is_no_table(metrics, table):
     with pytest.raises(InputError, match="has nothing to show"):
         table(metrics, sources={"cups": SOURCES["ycb"]})
-
-
-def drawn(files, sources=SOURCES):
-    curves = new_concepts.read_curves_by_concepts(files)
-    return new_concepts.new_concept_curves(Run(RUN | {"sources": sources}), curves)
-
-
-def test_a_line_is_drawn_for_each_embedding_and_a_row_for_each_kind_of_concept(rare_files):
-    words = words_of(drawn(rare_files))
-    assert [text for text in words if text in ("same samples, all concepts", "nothing: measurements of the pair")]
-    assert not [text for text in words if "errors" in text]
-    rows = [text for text in words if "new: " in text]
-    assert len(rows) == 2
-    assert any("nominal" in text for text in rows)
-    assert {"Means over 1 seed", "target (90 %)"} <= set(words)
-    with pytest.raises(InputError, match="has no curve of these sources"):
-        drawn(rare_files, {"cups": SOURCES["ycb"]})

@@ -10,8 +10,8 @@ import pytest
 from gpca.errors import InputError
 from gpca.evaluation.measures import AGAINST, KEYS, NUMBERS, tidy
 from gpca.evaluation.measures import COLUMNS as INTERVALS
-from gpca.experiments.recovery import policy_titles, table8_recovery
-from gpca.experiments.recovery_curves import losses, queued_labels, recovery_costs, recovery_rates, recovery_thresholds
+from gpca.experiments.recovery import table8_recovery
+from gpca.experiments.recovery_curves import recovery_rates
 from gpca.experiments.recovery_example import fig1_recovery_example, fig6_mitigation
 from gpca.io.arrays import save_arrays
 from gpca.pairs.perturbation import CONCEPTS
@@ -32,9 +32,6 @@ def metrics():
             values |= dict.fromkeys(("episodes", "acted_first", "nominal"), episodes) | {"tries": 10 * episodes}
             values |= {"wrong_first": 0.5, "queued": 0.0, "left_alone": 0.125, "actions": 1.5}
             values |= {"cost": 0.03, "acted_nominal": 0.25, "cost_nominal": 0.02}
-            for limit in (2, 10):
-                values |= {f"recovered_within_{k}_at_{limit}": 0.5 for k in (1, 2, 3)}
-                values[f"failures_at_{limit}"] = episodes
             for seed in (0, 1):
                 records += [("recovery", "recovery", policy, m, cause, seed, v) for m, v in values.items()]
     return tidy(records, "recovery")
@@ -107,62 +104,12 @@ def test_rates_are_drawn(metrics, same_bytes):
         recovery_rates(run_of("oracle"), metrics)
 
 
-def test_thresholds_and_costs_are_drawn_for_the_policies_that_there_are(metrics, same_bytes):
-    run = run_of("gpca_acting", "error_only", "always_denoise")
-    titles = policy_titles(run.config)
-    methods = {"gpca": "gpca_acting", "random": "error_only"}
-    renamed = metrics.assign(method=metrics["method"].map(methods))
-    fixed = renamed[renamed["method"] == "error_only"].assign(method="always_denoise")
-    both = pd.concat([renamed, fixed])
-    by_limit = recovery_thresholds(run, both)
-    named = [text.get_text() for text in by_limit.legends[0].get_texts()]
-    assert named == [titles["gpca_acting"], titles["always_denoise"]]
-    assert "failures: 24 at 2 %, 24 at 10 %" in by_limit.get_suptitle()
-    by_factor = recovery_costs(run, both)
-    named = [text.get_text() for text in by_factor.legends[0].get_texts()]
-    assert named == [titles["error_only"], titles["always_denoise"]]
-    assert np.ptp(same_bytes(lambda: recovery_costs(run, both))) > 100
-    for draw in (recovery_thresholds, recovery_costs):
-        with pytest.raises(InputError, match="have no recovery rates"):
-            draw(run_of("oracle"), metrics)
-
-
-def test_a_loss_by_hand(metrics):
-    loss_F = losses(metrics, "gpca", 3, 0.2, 0.1, np.array([1.0, 2.0]))
-    assert loss_F[0] == pytest.approx(0.1 * (0.25 + 0.03) + 0.9 * (0.25 * 0.2 + 0.02))
-    assert loss_F[1] - loss_F[0] == pytest.approx(0.1 * 0.03 + 0.9 * 0.02)
-
-
 def test_the_mapping_is_drawn_from_the_thresholds(tmp_path, same_bytes):
     path = tmp_path / "policy.json"
     path.write_text(json.dumps(POLICY))
     first = same_bytes(lambda: fig6_mitigation(run_of(), path))
     path.write_text(json.dumps(POLICY | {"thresholds": POLICY["thresholds"] | {"uncertain": 0.125}}))
     assert (same_bytes(lambda: fig6_mitigation(run_of(), path)) != first).any()
-
-
-@pytest.fixture
-def queues():
-    rows = [
-        (policy, order, labels, 24, 0.6 - share * labels, 0.3, 0.7)
-        for policy in ("gpca", "random")
-        for order, share in (("queued", 0.02), ("random", 0.01))
-        for labels in (0, 4, 8)
-    ]
-    columns = ["policy", "order", "labels", "failures", "error", "low", "high"]
-    return pd.DataFrame(rows, columns=columns)
-
-
-def test_both_orders_of_queued_cases_have_a_band_and_the_axis_ends_above_them(queues, same_bytes):
-    figure = queued_labels(run_of(), queues)
-    assert [text.get_text() for text in figure.texts] == ["Tables of the virtual camera, Tiny: judged on 24 failures"]
-    assert len(figure.legends[0].get_texts()) == 2
-    for panel in figure.axes:
-        assert len(panel.collections) == 2
-        assert panel.get_ylim() == pytest.approx((0, 73.5))  # 70 is the largest bound
-    image = same_bytes(lambda: queued_labels(run_of(), queues))
-    flat = same_bytes(lambda: queued_labels(run_of(), queues.assign(error=0.5)))
-    assert (image != flat).any()
 
 
 def test_the_example_is_drawn_and_one_without_its_second_view_refused(tmp_path, same_bytes):

@@ -13,7 +13,6 @@ from gpca.experiments.recovery_measures import (
     collect,
     collect_differences,
     collect_intervals,
-    metrics_at,
     policy_metrics,
     pool_share,
     read_recovery,
@@ -22,16 +21,15 @@ from gpca.io.csv_file import write_csv
 from gpca.pairs.perturbation import CONCEPTS
 
 COSTS = {"denoise": 0.02, "reinitialize": 0.01, "new_view": 0.03}
-CURVE = (0.02, 0.05, 0.3)
 
 
-def run_of(*policies, budget=3, curve=(0.02, 0.1)):
+def run_of(*policies, budget=3):
     recovery = {
         "objects": "tiny", "policies": policies or ("gpca", "random", "oracle"), "actions": dict.fromkeys(COSTS),
         "treatments": TREATMENTS, "costs": COSTS, "needless": 0.2, "loop": {"budget": budget},
     }  # fmt: skip
     sources = {"tiny": {"title": "Tiny", "kind": "procedural", "stand_in": False}}
-    return Run({"recovery": recovery, "sources": sources, "success": {"error": 0.03, "curve": curve}})
+    return Run({"recovery": recovery, "sources": sources, "success": {"error": 0.03}})
 
 
 def rows_of(*episodes, policy="gpca"):
@@ -90,14 +88,6 @@ def test_what_did_not_fail_counts_apart():
     assert values["cost_nominal"] == pytest.approx(0.02 / 2)
     left = policy_metrics(rows_of(("pose", [NOTHING], False)), TREATMENTS, COSTS, 3)
     assert (left["left_alone"], left["queued"], left["recovered_within_3"]) == (1, 0, 0)
-
-
-def test_by_another_limit_only_failures_by_it_count():
-    values = metrics_at(rows_of(*EPISODES), 3, CURVE)
-    assert [values[f"failures_at_{limit}"] for limit in (2, 5, 30)] == [4, 4, 0]
-    assert [values[f"recovered_within_{k}_at_2"] for k in (1, 2, 3)] == [0.25, 0.5, 0.5]
-    assert [values[f"recovered_within_{k}_at_5"] for k in (1, 2, 3)] == [1, 1, 1]  # 4 % is right by that limit
-    assert "recovered_within_1_at_30" not in values
 
 
 def test_shares_are_pooled_over_the_failures_of_all_seeds(files):
@@ -164,7 +154,7 @@ def shares(taken_files, tmp_path):
 
 
 def test_shares_are_those_of_the_metrics(taken_files, shares):
-    metrics = collect(run_of(budget=2, curve=()), taken_files)
+    metrics = collect(run_of(budget=2), taken_files)
     for policy, metric, concept in shares.index:
         share, samples = pool_share(metrics, policy, metric, concept)
         row = shares.loc[policy, metric, concept]

@@ -1,4 +1,4 @@
-"""Table VII and its figure."""
+"""Table VII."""
 
 import pandas as pd
 import pytest
@@ -6,8 +6,8 @@ import pytest
 from gpca.comparison.published import printed_seconds, read_published
 from gpca.declarations.plan import Run
 from gpca.errors import InputError
-from gpca.evaluation.runtime_file import COMPONENTS, OF_ONE_EXPLANATION, RUNTIME_COLUMNS
-from gpca.experiments.runtime import ALL_STAGES, draw_runtime, stages_of, table7_runtime
+from gpca.evaluation.runtime_file import COMPONENTS, RUNTIME_COLUMNS
+from gpca.experiments.runtime import table7_runtime
 
 
 def rows(device="CPU", hardware="A processor, 2 cores", components=tuple(COMPONENTS), start=0.001):
@@ -34,34 +34,13 @@ def test_every_component_stands_beside_the_printed_value():
     for measured in ("100 runs, 1 thread", "A processor, 2 cores", "A GPU", "i7-12700K", "RTX 3090", "10 to 30 s"):
         assert measured in text
     assert set(printed_seconds(NUMBERS)) < set(COMPONENTS)
-    assert "**" not in text.replace("**Runtime per component on Tiny, and as the paper prints it**", "")
+    assert "**" not in text.replace("**Table VII: Runtime per component on Tiny, and as the paper prints it**", "")
     records = {(row[0], row[1], row[3]): row for row in table.records()[1:]}  # milliseconds and the number of runs
     assert records["icp", "CPU", "mean"][4] == pytest.approx(1.0)
     assert records["icp", "CPU", "mean"][8] == 100
     assert records["retraining", "CPU", "published"][4:] == (10000.0, "", "", 1, 100, True)
 
 
-def test_the_stages_add_up_to_one_explanation():
-    paper, cpu, gpu = stages_of(RUNTIME, NUMBERS).values()
-    assert sum(stage.mean for stage in paper.values()) == pytest.approx(4225)
-    assert {stage.deviation for stage in paper.values()} == {0}
-    assert list(cpu) == list(gpu) == list(OF_ONE_EXPLANATION)
-    assert sum(stage.mean for stage in cpu.values()) == pytest.approx(1 + 3 + 4 + 5)
-    assert gpu == cpu | {"features": pytest.approx((0.1, 0.5))}
-
-
-def test_all_times_are_on_one_scale_and_ours_have_their_spread(same_bytes):
-    [panel] = draw_runtime(RUN, RUNTIME, NUMBERS).axes
-    assert panel.get_xscale() == "log"
-    assert [label.get_text() for label in panel.get_yticklabels()][-1] == ALL_STAGES
-    spans = [line.get_xdata() for line in panel.get_lines() if len(line.get_xdata()) == 2 and line.get_linewidth() == 1]
-    icp = next(span for span in spans if span[0] != span[1])
-    assert list(icp) == pytest.approx([0.5, 1.5])
-    same_bytes(lambda: draw_runtime(RUN, RUNTIME, NUMBERS))
-
-
 def test_what_was_not_measured_is_named():
-    with pytest.raises(InputError, match="has no row of 'scores'"):
-        stages_of(RUNTIME[RUNTIME["component"] != "scores"], NUMBERS)
     with pytest.raises(InputError, match="has no rows"):
         table7_runtime(RUN, RUNTIME[:0], NUMBERS)

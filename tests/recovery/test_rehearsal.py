@@ -1,19 +1,14 @@
-"""Rehearsed failures: the threshold that is chosen on them, and what their labels are worth."""
+"""Rehearsed failures: the threshold that is chosen on them."""
 
 import numpy as np
-import pandas as pd
 import pytest
 
-from gpca.causes.policy import DOUBTED, DRAWN
 from gpca.classifier.scores import Attribution
-from gpca.errors import InputError
-from gpca.experiments.recovery_measures import read_queues
-from gpca.io.csv_file import write_csv
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.answers import LoopExplainers
-from gpca.recovery.chances import FailureGate, Trial
+from gpca.recovery.chances import FailureGate
 from gpca.recovery.policies import Means
-from gpca.recovery.rehearsal import BATCH, DRAWS, ChancesLearner, Rehearsal, error_by_labels, robot_policy, summary
+from gpca.recovery.rehearsal import Rehearsal, robot_policy, summary
 
 SECTION = {
     "thresholds": {"uncertain": None, "queued_share": 0.5, "dominant": 0.4, "improvement": 0.3},
@@ -55,42 +50,3 @@ def test_the_summary_says_how_often_each_explainer_is_right(rehearsal):
     assert content["calibration_accuracy"] == {"gpca": 0.5}
     assert content["calibration_samples"] == 30
     assert content["treatments"] == SECTION["treatments"]
-
-
-COSTS = {"denoise": 0.01, "new_view": 0.02}
-
-
-class Queued:
-    failed = True
-
-
-@pytest.fixture
-def rows():
-    """Twelve queued cases of which new_view always helps, four others that it solves too."""
-    trials = [[Trial(np.zeros(2), a, a == "new_view") for a in COSTS] for _ in range(12)]
-    learners = {"utility": lambda: ChancesLearner(trials, [np.zeros(2)] * 4, COSTS)}
-    rehearsal = Rehearsal([Queued()] * 12, dict(enumerate(trials)))
-    return error_by_labels(learners, [{"denoise": False, "new_view": True}] * 4, rehearsal, ("tiny", 0))
-
-
-def test_the_error_falls_with_the_labels_that_are_learned(rows):
-    assert set(rows["order"]) == {DOUBTED, DRAWN}
-    for _, curve in rows.groupby(["order", "draw"]):
-        assert curve["labels"].tolist() == list(range(0, 13, BATCH))
-        assert curve["unsolved"].tolist() == [4, 0, 0, 0]  # without a label the cheapest action is taken
-    assert len(rows) == (1 + DRAWS) * 4
-    assert error_by_labels({}, [], None, ()).empty
-
-
-def test_seeds_are_pooled_at_the_numbers_that_all_have(rows, tmp_path):
-    paths = [tmp_path / f"queue_seed{seed}.csv" for seed in (0, 1)]
-    write_csv(paths[0], rows)
-    write_csv(paths[1], rows[rows["labels"] < 8].assign(unsolved=2))
-    queues = read_queues(paths).set_index(["order", "labels"])
-    assert queues.loc[DOUBTED, "error"].tolist() == [6 / 8, 2 / 8]
-    assert queues.loc[(DRAWN, 4), "failures"] == 8
-    assert (queues["low"] <= queues["error"]).all()
-    assert (queues["error"] <= queues["high"]).all()
-    write_csv(paths[1], pd.DataFrame(columns=rows.columns))
-    with pytest.raises(InputError, match="has no rows"):
-        read_queues(paths[1:])

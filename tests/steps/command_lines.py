@@ -145,10 +145,10 @@ STEP_OPTIONS = {
         "--settings": {"controls": CONTROLS, "encoder": ENCODER, "uncertainty": {"starts": 13, "icp_points": 40},
                        "icp": {"max_iterations": 20},
                        "explainers": {"gpca": FEW, "residuals_logistic": {}}},
-        "--seed": 0, "--objects": "objects.npz", "--registrations": "registrations.npz", "--encoder": "weights.pt",
+        "--seed": 0, "--registrations": "registrations.npz", "--encoder": "weights.pt",
         "--embeddings": "embeddings.npz", "--retrained": "density", "--retrained-embeddings": "control.npz",
         "--others": "other", "--other-registrations": "other.npz", "--predictions": "controls.csv",
-        "--samples": "control_samples.csv", "--timings": "control_seconds.csv",
+        "--timings": "control_seconds.csv",
     },
     "exchange": COMMON | {
         "--settings": {
