@@ -4,21 +4,19 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
 from gpca.active_learning.curves import TABLE
 from gpca.active_learning.settings import JUDGED_SHARE, rare_setting
 from gpca.causes.judged import CEILING
 from gpca.evaluation.intervals import TRIVIAL
 from gpca.evaluation.measures import ALL, POOLED, read_clustered, read_metrics
-from gpca.experiments.frames import read_together
 from gpca.explainers.gpca import GPCA_FORMS
-from gpca.io.frame import Frame
+from gpca.io.frame import Frame, Series
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.words import plural
 
 RULE = "rule"
 PAPERS_RIVALS = {"shap_additive": "SHAP", "sa_local_additive": "sensitivity analysis"}
+ON_FRAMES = {"dgcnn-none": "DGCNN without reduction", "gpca_pair": "GP-CA on the pair", RULE: "the untrained rule"}
 
 
 class Finding(NamedTuple):
@@ -40,11 +38,11 @@ class Titles(NamedTuple):
 def findings_of(folder: Path, titles: Titles, shown: Collection[str]) -> list[Finding]:
     """Return the findings from the collected files in ``results/{run}`` whose results are shown."""
     readers: dict[str, tuple[Callable, Callable[[Frame, Titles], Iterator[Finding]]]] = {
-        "metrics.csv": (read_metrics, _concepts),
+        "attribution_intervals.csv": (read_clustered, _concepts),
         "cause_intervals.csv": (read_clustered, _causes),
-        "real_world.csv": (read_together, _frames),
+        "real_world_intervals.csv": (read_clustered, _frames),
         "active_learning.csv": (read_metrics, _labels),
-        "recovery.csv": (read_metrics, _recovery),
+        "recovery_intervals.csv": (read_clustered, _recovery),
     }
     findings: list[Finding] = []
     for name, (read, find) in readers.items():
@@ -53,47 +51,26 @@ def findings_of(folder: Path, titles: Titles, shown: Collection[str]) -> list[Fi
     return [finding for finding in findings if finding.result in shown]
 
 
-def _concepts(metrics: Frame, titles: Titles) -> Iterator[Finding]:
-    accuracies = _accuracies(metrics)
-    if RULE in accuracies:
+def _concepts(intervals: Frame, titles: Titles) -> Iterator[Finding]:
+    rows = intervals[(intervals["metric"] == "accuracy") & (intervals["concept"] == ALL)]
+    by_dataset = {str(name): group for name, group in rows[rows["source"] != POOLED].groupby("method")}
+    datasets = "of the test registrations, depending on the dataset (bounds of all 95 % intervals)"
+    if RULE in by_dataset:
         text = (
-            "An untrained rule names the perturbed concept of the paper's protocol in "
-            f"{_span(accuracies[RULE])} of the test registrations, depending on the dataset: turned by ICP, pose; "
-            "points missing, overlap; otherwise noise. What a method adds is its lead over this rule."
+            f"An untrained rule names the perturbed concept of the paper's protocol in {_range(by_dataset[RULE])} "
+            f"{datasets}: turned by ICP, pose; points missing, overlap; otherwise noise. What a method adds is its "
+            "lead over this rule."
         )
-        yield Finding(_span(accuracies[RULE]), text, "table1_extended")
-    forms = {name: accuracies[name].mean() for name in GPCA_FORMS if name in accuracies}
-    if forms:
-        span = _span(accuracies[next(iter(forms))])
-        rivals = [f"{words} {_span(accuracies[name])}" for name, words in PAPERS_RIVALS.items() if name in accuracies]
+        yield Finding(_span(by_dataset[RULE]["value"]), text, "table1_extended")
+    form = next((name for name in GPCA_FORMS if name in by_dataset), None)
+    if form:
+        others = {name: words for name, words in PAPERS_RIVALS.items() if name in by_dataset}
+        rivals = "".join(f"; {words} in {_range(by_dataset[name])}" for name, words in others.items())
         text = (
-            f"Under the paper's protocol, GP-CA names the perturbed concept in {span} of the test registrations, "
-            f"depending on the dataset{''.join(f'; {rival}' for rival in rivals)}. Guessing gives a third."
+            f"Under the paper's protocol, {titles.explainers[form]['title']} names it in {_range(by_dataset[form])} "
+            f"{datasets}{rivals}. Guessing gives a third."
         )
-        yield Finding(span, text, "table1_single_baselines")
-    others = {
-        name: accuracies[name].mean()
-        for name, entry in titles.explainers.items()
-        if name in accuracies and not entry["oracle"] and name not in GPCA_FORMS and name not in TRIVIAL
-    }
-    if forms and others:
-        best, best_form = max(others, key=others.__getitem__), max(forms, key=forms.__getitem__)
-        text = (
-            f"{titles.explainers[best]['title']} comes first among the {len(others)} other explainers without access "
-            f"to the truth, with {_percent(others[best], 1)} on average over the datasets, where "
-            f"{titles.explainers[best_form]['title']} has {_percent(forms[best_form], 1)}."
-        )
-        yield Finding(_percent(others[best], 1), text, "table1_extended")
-    gpca = next((name for name in GPCA_FORMS if (metrics["method"] == name).any()), None)
-    rows = metrics[(metrics["method"] == gpca) & (metrics["concept"] == ALL)]
-    counts = rows[rows["metric"].isin(("causal_samples", "test_samples"))].groupby("metric")["value"].sum()
-    if len(counts) == 2:
-        share = _percent(counts["causal_samples"] / counts["test_samples"])
-        text = (
-            f"{share} of these registrations are more uncertain than 95 % of clean pairs. The labels of the protocol "
-            "say what was perturbed, not whether that did any harm."
-        )
-        yield Finding(share, text, "table1_extended")
+        yield Finding(_span(by_dataset[form]["value"]), text, "table1_single_baselines")
 
 
 def _causes(intervals: Frame, titles: Titles) -> Iterator[Finding]:
@@ -125,8 +102,8 @@ def _causes(intervals: Frame, titles: Titles) -> Iterator[Finding]:
         left = _percent(rows.loc[best, "value"])
         text = (
             f"Removing the cause that the best explainer names first leaves {left} of the error of a failed "
-            f"registration that removing the right one would take away ({words[best]}); the untrained rule leaves "
-            f"{_percent(rows.loc[RULE, 'value'])}."
+            f"registration that removing the right one would take away ({_bounds(rows.loc[best])}; {words[best]}); the "
+            f"untrained rule leaves {_percent(rows.loc[RULE, 'value'])} ({_bounds(rows.loc[RULE])})."
         )
         yield Finding(left, text, "table9_causes")
 
@@ -141,65 +118,75 @@ def _pooled(intervals: Frame, titles: Titles, metric: str) -> tuple[Frame, list[
     return rows, [name for name in titles.cause_explainers if name in rows.index and name not in TRIVIAL]
 
 
-def _frames(metrics: Frame, titles: Titles) -> Iterator[Finding]:
-    # Names are of backbone and reduction.
-    if means := [accuracies.mean() for name, accuracies in _accuracies(metrics).items() if "-" in name]:
-        span = _span(np.array(means))
-        text = f"On objects in depth frames, GP-CA is right in {span} of the cases, depending on encoder and reduction."
-        yield Finding(span, text, "table6_backbones")
+def _frames(intervals: Frame, titles: Titles) -> Iterator[Finding]:
+    rows = intervals[(intervals["metric"] == "accuracy") & (intervals["concept"] == ALL)]
+    rows = rows[rows["table"] == "attribution"].drop_duplicates("method").set_index("method")
+    named = {name: words for name, words in ON_FRAMES.items() if name in rows.index}
+    if named:
+        parts = [f"{words} in {_bounded(rows.loc[name])}" for name, words in named.items()]
+        text = f"On objects in depth frames, the perturbed concept is named by {'; '.join(parts)}."
+        yield Finding(_percent(rows.loc[next(iter(named)), "value"]), text, "table6_backbones")
 
 
 def _labels(metrics: Frame, titles: Titles) -> Iterator[Finding]:
-    bald, random = (_median_labels(metrics, name) for name in ("bald_kmeans", "random"))
-    if bald and random:
+    counts = {name: _labels_needed(metrics, name) for name in ("bald_kmeans", "random")}
+    if all(counts.values()):
         text = (
             f"A concept that the classifier has never seen, {100 * JUDGED_SHARE:g} % of the pool, is known after "
-            f"{bald} chosen by BALD and k-means, and after {random} drawn at random (medians)."
+            f"{counts['bald_kmeans']}, chosen by BALD with k-means; after {counts['random']}, chosen at random."
         )
-        yield Finding(bald, text, "table3_active_learning")
+        yield Finding(counts["bald_kmeans"], text, "table3_active_learning")
 
 
-def _recovery(metrics: Frame, titles: Titles) -> Iterator[Finding]:
-    rows = metrics[(metrics["metric"] == f"recovered_within_{titles.budget}") & (metrics["concept"] == ALL)]
-    shares = {name: _percent(share) for name, share in rows.groupby("method")["value"].mean().items()}
-    if "gpca" in shares:
-        others = {"random": "random actions", "oracle": "a policy that knows the cause"}
-        beside = "".join(f"; {words} {shares[name]}" for name, words in others.items() if name in shares)
-        text = (
-            f"In a closed loop on rendered tables, GP-CA's policy repairs {shares['gpca']} of the failed "
-            f"registrations with at most {plural(titles.budget, 'action')}{beside}."
-        )
-        yield Finding(shares["gpca"], text, "table8_recovery")
-
-
-def _accuracies(metrics: Frame) -> dict[str, np.ndarray]:
-    """Return method -> mean accuracy over the seeds, by source."""
-    rows = metrics[(metrics["metric"] == "accuracy") & (metrics["concept"] == ALL)]
-    means = rows.groupby(["method", "source"])["value"].mean()
-    return {str(method): accuracies.to_numpy() for method, accuracies in means.groupby(level="method")}
-
-
-def _median_labels(metrics: Frame, strategy: str) -> str | None:
-    """Return the median number of labels over datasets and seeds, in words; a lower bound if it is censored."""
+def _labels_needed(metrics: Frame, strategy: str) -> str:
+    """Return how many labels the runs needed that reached the target, and how many of all did; empty without runs."""
     rows = metrics[(metrics["table"] == TABLE + rare_setting(JUDGED_SHARE)) & (metrics["method"] == strategy)]
     rows = rows[rows["concept"].isin(CONCEPTS)].set_index(["source", "concept", "seed"])
     to_target, reached, labels = (
         rows.loc[rows["metric"] == name, "value"] for name in ("labels_to_target", "reached", "labels")
     )
+    known = to_target[reached == 1]
     if reached.empty:
-        return None
-    median = float(np.median(np.where(reached == 1, to_target, np.inf)))
-    return f"{median:g} labels" if np.isfinite(median) else f"more than {labels.median():g} labels"
+        return ""
+    if known.empty:
+        return f"more than {labels.min():g} labels in each of {plural(len(reached), 'run')}"
+    words = f"{known.min():g} to {known.max():g}" if known.min() < known.max() else f"{known.min():g}"
+    return f"{words} labels in {len(known)} of {plural(len(reached), 'run')}"
+
+
+def _recovery(intervals: Frame, titles: Titles) -> Iterator[Finding]:
+    rows = intervals[(intervals["metric"] == f"recovered_within_{titles.budget}") & (intervals["concept"] == ALL)]
+    rows = rows.drop_duplicates("method").set_index("method")
+    if "gpca" not in rows.index:
+        return
+    fixed = rows[rows.index.str.startswith("sequence_")]["value"]
+    named = {"random": "random actions", "oracle": "a policy that knows the cause"}
+    named |= {fixed.idxmax(): "the best fixed sequence, in hindsight"} if len(fixed) else {}
+    beside = [f"; {words} {_bounded(rows.loc[name])}" for name, words in named.items() if name in rows.index]
+    text = (
+        f"In a closed loop on rendered tables, GP-CA's policy repairs {_bounded(rows.loc['gpca'])} of the failed "
+        f"registrations with at most {plural(titles.budget, 'action')}{''.join(beside)}."
+    )
+    yield Finding(_percent(rows.loc["gpca", "value"]), text, "table8_recovery")
+
+
+def _range(rows: Frame) -> str:
+    """Return the least and largest share over the datasets, and the bounds of all their intervals."""
+    return f"{_span(rows['value'])} ({100 * rows['low'].min():.0f} to {100 * rows['high'].max():.0f})"
+
+
+def _bounded(row: Mapping) -> str:
+    return f"{_percent(row['value'])} ({_bounds(row)})"
 
 
 def _bounds(row: Mapping) -> str:
     return f"{100 * row['low']:.0f} to {100 * row['high']:.0f}"
 
 
-def _percent(share: float, decimals: int = 0) -> str:
-    return f"{100 * share:.{decimals}f} %"
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %"
 
 
-def _span(shares: np.ndarray) -> str:
+def _span(shares: Series) -> str:
     low, high = (f"{100 * share:.0f}" for share in (shares.min(), shares.max()))
     return f"{low} %" if low == high else f"{low} to {high} %"

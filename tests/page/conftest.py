@@ -15,7 +15,7 @@ from gpca.reporting.registry import SUFFIXES
 from gpca.reporting.tables.table import Cell, Column, Table
 from tests.page.small_run import FIGURES, TABLES, Page, run_of
 from tests.page.test_comparison import HEAD, LINES
-from tests.page.test_findings import write_metrics
+from tests.page.test_findings import write_intervals
 
 
 @pytest.fixture(scope="package")
@@ -44,7 +44,8 @@ def folder(registrations, predicted, tmp_path_factory):
         panel.plot(np.arange(5))
         save_figure(figure, folder / f"figures/{name}.pdf", folder / f"figures/{name}.png")
     (folder / "comparison.csv").write_text(HEAD + "".join(LINES))
-    write_metrics(folder / "metrics.csv", [("bricks", "gpca", "accuracy", 0.9), ("cones", "gpca", "accuracy", 0.75)])
+    write_intervals(folder / "attribution_intervals.csv", [("bricks", "gpca", "accuracy", 0.9), ("cones", "gpca", "accuracy", 0.75)])
+    (folder / "metrics.csv").write_text("")
     predicted(registrations, folder)
     write_page(folder, run_of(folder))
     return folder

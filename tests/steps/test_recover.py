@@ -51,7 +51,7 @@ def settings(**changed):
 
 
 def call(folder, given):
-    files = {"--rows": "seed7.csv", "--timings": "t/seed7.csv", "--queue": "q/seed7.csv"} | OTHERS
+    files = {"--rows": "seed7.csv", "--timings": "t/seed7.csv"} | OTHERS
     paths = [word for option, name in files.items() for word in (option, str(folder / name))]
     return main(["recover", "--seed", "7", "--settings", given, *paths])
 
@@ -64,9 +64,6 @@ def test_the_step_writes_rows_seconds_thresholds_and_an_example(tmp_path):
     assert set(rows["table"]) <= {0, 1}
     assert len(seconds) == len(rows)
     assert (rows["failed"] == (rows.groupby(["episode", "policy"])["error_before"].transform("first") >= 0.03)).all()
-    queue = pd.read_csv(tmp_path / "q/seed7.csv")
-    assert set(queue["policy"]) == {"utility"}
-    assert queue["labels"].min() == 0
     policy = json.loads((tmp_path / "policy.json").read_text())
     assert set(policy["calibration_accuracy"]) == {"gpca", "softmax_head"}
     assert 0 <= policy["thresholds"]["uncertain"] < 1.1
@@ -74,9 +71,9 @@ def test_the_step_writes_rows_seconds_thresholds_and_an_example(tmp_path):
     assert 0 <= policy["thresholds"]["alarm"] <= 1
     assert sorted(policy["order"]) == ["denoise", "new_view", "reinitialize"]
     assert call(tmp_path / "again", settings()) == 0
-    for name in ("seed7.csv", "q/seed7.csv", "policy.json", "example.npz"):
+    for name in ("seed7.csv", "policy.json", "example.npz"):
         assert (tmp_path / name).read_bytes() == (tmp_path / "again" / name).read_bytes()
-    for name in ("seed7.csv", "t/seed7.csv", "q/seed7.csv", "policy.json", "example.npz"):
+    for name in ("seed7.csv", "t/seed7.csv", "policy.json", "example.npz"):
         assert (tmp_path / f"{name}.provenance.json").is_file()
 
 

@@ -47,8 +47,8 @@ MEASURED = SOURCES if NAMES["cause_explainer"] else []
 # What the page says first comes from these; where all objects of the run are stand-ins, the verdicts are those of the
 # reference on real ones.
 FOUND = [
-    *("metrics.csv", "cause_intervals.csv", "real_world.csv"),
-    *("active_learning.csv", "recovery.csv"),
+    *("attribution_intervals.csv", "cause_intervals.csv"),
+    *("real_world_intervals.csv", "active_learning.csv", "recovery_intervals.csv"),
 ]
 ROOT_OF_RUN = Path("results", config["run"])
 REFERENCE = ROOT / "results/reference/full/comparison.csv"
