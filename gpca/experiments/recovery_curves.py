@@ -1,8 +1,7 @@
-"""Figures of recovery: rates by policy, what the allowed error and the costs decide, and labels of queued cases."""
+"""Figure of recovery: the share of failures that each policy recovers, by action and by cause."""
 
 from collections.abc import Mapping
 from math import nan
-
 
 from gpca.declarations.plan import Run
 from gpca.declarations.result import Figure, Frame, figure

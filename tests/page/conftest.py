@@ -44,7 +44,9 @@ def folder(registrations, predicted, tmp_path_factory):
         panel.plot(np.arange(5))
         save_figure(figure, folder / f"figures/{name}.pdf", folder / f"figures/{name}.png")
     (folder / "comparison.csv").write_text(HEAD + "".join(LINES))
-    write_intervals(folder / "attribution_intervals.csv", [("bricks", "gpca", "accuracy", 0.9), ("cones", "gpca", "accuracy", 0.75)])
+    write_intervals(
+        folder / "attribution_intervals.csv", [("bricks", "gpca", "accuracy", 0.9), ("cones", "gpca", "accuracy", 0.75)]
+    )
     (folder / "metrics.csv").write_text("")
     predicted(registrations, folder)
     write_page(folder, run_of(folder))
