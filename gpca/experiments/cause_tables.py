@@ -168,7 +168,8 @@ def table9_causes(run: Run, intervals):
     )
     caption = "What is wrong with a registration, if anything: objects that no explainer was trained on"
     caption += ", procedural stand-ins among them" if run.stand_ins() else ""
-    return sheet.table(caption, "metric", notes, bold=[key for key in SHOWN if key not in NOT_COMPARED], same=1)
+    bold = sorted((key for key in SHOWN if key not in NOT_COMPARED), key=lambda key: key != "balanced_accuracy")
+    return sheet.table(caption, "metric", notes, bold=bold, same=1)
 
 
 def rule_near_chance(intervals: Frame, sources: Iterable[str], **wanted: object) -> str:
