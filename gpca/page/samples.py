@@ -26,8 +26,8 @@ RULE = (
     "of their numbers, right or wrong."
 )
 CAUSES_RULE = (
-    "Then follow the failed test registrations whose causes were measured: of every source, the first of each dominant "
-    "cause in the run's first seed."
+    "First come failed test registrations whose causes were measured: of every source, the first of each dominant cause "
+    "in the run's first seed that fails from the shown start, too."
 )
 POINTS = 600  # of a shown cloud at most
 UNIT, DIAMETER = "% of the diameter", 100  # unit of lengths on the page
@@ -82,7 +82,8 @@ def first_of_each_concept(registrations: Registrations) -> list[int]:
 
 def first_of_each_cause(causes: Causes) -> list[int]:
     """Return the rows of `CAUSES_RULE`, concept by concept."""
-    return _first_of_each(causes.registrations, causes.truth.dominant, causes.truth.state == FAILED, 1)
+    failed_S = (causes.truth.state == FAILED) & (causes.error_shown > causes.truth.failed_limit)
+    return _first_of_each(causes.registrations, causes.truth.dominant, failed_S, 1)
 
 
 def _first_of_each(registrations: Registrations, concept_S: np.ndarray, chosen_S: np.ndarray, count: int) -> list[int]:

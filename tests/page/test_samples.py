@@ -166,6 +166,7 @@ def test_the_first_failure_of_each_cause_is_shown(shown, causes):
     assert 0 < len(rows) <= len(CONCEPTS)
     assert set(causes.registrations.split[rows]) == {"test"}
     assert set(causes.truth.state[rows]) == {"failed"}
+    assert (causes.error_shown[rows] > causes.truth.failed_limit).all()
     assert [sample["concept"] for sample in shown] == causes.truth.dominant[rows].tolist()
     assert len({sample["concept"] for sample in shown}) == len(shown)
     assert first_of_each_cause(causes.subset(causes.rows("train"))) == []
