@@ -8,7 +8,7 @@ from gpca.causes.dataset import LABELS
 from gpca.causes.truth import ALL, NONE
 from gpca.pairs.perturbation import NOISE, OVERLAP
 from gpca.reenactment.dataset import row_of, verdict
-from gpca.reenactment.enactment import NoiseScale, fresh_points, observe, rebuild, reenact
+from gpca.reenactment.enactment import NoiseScale, completed, fresh_points, observe, rebuild, reenact
 from gpca.reenactment.hypotheses import Hypothesis
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
@@ -147,3 +147,14 @@ def test_what_finds_no_partner_is_as_wrong_as_can_be(drill):
     enacted = reenact(replace(pair, T_init=far), SETTINGS, TRUTH)[0]
     assert enacted.error_8[ALL] == 0.5
     assert enacted.error_8[NONE] < 0.1
+
+
+def test_a_symmetric_model_stays_one_beside_a_table(can):
+    model, random = ModelSurface(can[:400]), np.random.default_rng(0)
+    table = np.column_stack([random.uniform(0.1, 0.9, size=(120, 2)), np.full(120, can[:, 2].min())])
+    on_table = np.arange(520) >= 400
+    beside = Hypothesis(np.eye(4), np.ones(520), 0.0, 0.02, 1.0, 0.0, on_table.astype(float))
+    observation = observe(np.concatenate([can[400:800], table]), beside, model, NoiseScale(model, random), random)
+    assert observation.is_lone.mean() > 0.1 and model.symmetric
+    assert completed(model, observation) is model
+    assert not model.completed(observation.points[observation.is_lone], 0.0).symmetric
