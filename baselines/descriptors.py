@@ -257,6 +257,10 @@ _density = partial(regression, {"planes": DENSITIES})
 _distances = partial(forest, {"distances": EVERY, "motion": EVERY})
 
 
+def _own(title: str, make: Callable[..., interface.ConceptExplainer]) -> ExplainerEntry:
+    return replace(entry(title, make, ALL if make is Committee else WITH_RUNS), own=True)
+
+
 def _further(title: str, make: Callable[..., interface.ConceptExplainer]) -> ExplainerEntry:
     return replace(entry(title, make, WITH_RUNS), further=True)
 
@@ -283,6 +287,8 @@ CAUSE_EXPLAINERS = {
     "gpca_pair_clouds": entry(f"GP-CA on the pair, {WITHOUT}", CausePairGPCA, CLOUDS),
     "gpca_multilabel": entry("GP-CA on the pair, multi-label", MultiLabelGPCA, ALL),
     "gpca_multilabel_clouds": entry(f"GP-CA on the pair, multi-label, {WITHOUT}", MultiLabelGPCA, CLOUDS),
+    "pair_forest_own": _own("Distances of the pair (forest), own source alone", _distances),
+    "pair_committee_own": _own("Committee on the pair, own source alone", Committee),
     "gpca_further": _further("GP-CA on the pair, further samples", QuickGPCA),
     "committee_further": _further("Committee on the pair, further samples", QuickCommittee),
     "pair_committee": entry("Committee on the pair", Committee, ALL),

@@ -68,7 +68,8 @@ def _asked(plan: Plan, explainers: Iterable[str]) -> dict[str, Any]:
 
 
 def _inside(plan: Plan) -> list[str]:
-    return [name for name in plan.config["diagnosis"]["explainers"] if name not in plan.names["outside_explainer"]]
+    names, outside = plan.config["diagnosis"]["explainers"], plan.names["outside_explainer"]
+    return [name for name in names if name not in outside and not explainer_entry(name, CAUSES).own]
 
 
 def _if_read(plan: Plan, files: str) -> str | list[str]:

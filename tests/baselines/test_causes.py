@@ -26,7 +26,7 @@ FAST |= {name: FAST["gpca"] for name in explainers(CAUSES) if name.startswith("g
 FAST |= {name: FAST["pair_forest"] for name in explainers(CAUSES) if name.startswith("trees_on_")}
 FAST |= {f"{name}_clouds": settings for name, settings in FAST.items()}
 # Each is made of three of the others, and slow.
-COMMITTEES = {"committee_further", "pair_committee", "pair_committee_clouds", "reenact_committee"}
+COMMITTEES = {"committee_further", "pair_committee_own", "pair_committee", "pair_committee_clouds", "reenact_committee"}
 NAMES = sorted(set(explainers(CAUSES)) - COMMITTEES)
 
 
