@@ -65,7 +65,10 @@ def select(name: str, pool: Pool, batch: int, random: np.random.Generator) -> np
     wanted = min(batch, len(pool.h_N_d))
     if wanted == len(pool.h_N_d):
         return np.arange(wanted)
-    rows = require_numbers(strategy.choose(pool, wanted, random), (None,), f"strategy '{name}': its rows", "iu")
+    answer: object = strategy.choose(pool, wanted, random)
+    if isinstance(answer, list) and all(isinstance(row, int | np.integer) for row in answer):
+        answer = np.array(answer, dtype=int)
+    rows = require_numbers(answer, (None,), f"strategy '{name}': its rows", "iu")
     if not ((rows >= 0) & (rows < len(pool.h_N_d))).all():
         raise InputError(f"strategy '{name}'", f"returns rows that a pool of {len(pool.h_N_d)} has not", "correct it")
     chosen = np.array(list(dict.fromkeys(rows.tolist())), dtype=int)
