@@ -258,7 +258,7 @@ _distances = partial(forest, {"distances": EVERY, "motion": EVERY})
 
 
 def _own(title: str, make: Callable[..., interface.ConceptExplainer]) -> ExplainerEntry:
-    return replace(entry(title, make, ALL if make is Committee else WITH_RUNS), own=True)
+    return replace(entry(title, make, ALL if make is Committee else WITH_RUNS), alone=True)
 
 
 def _further(title: str, make: Callable[..., interface.ConceptExplainer]) -> ExplainerEntry:
