@@ -26,8 +26,8 @@ RULE = (
     "of their numbers, right or wrong."
 )
 CAUSES_RULE = (
-    "First come failed test registrations whose causes were measured: of every source, the first of each dominant cause "
-    "in the run's first seed that fails from the shown start, too."
+    "First come failed test registrations whose causes were measured: of every source, the first of each dominant "
+    "cause in the run's first seed that fails from the shown start, too."
 )
 POINTS = 600  # of a shown cloud at most
 UNIT, DIAMETER = "% of the diameter", 100  # unit of lengths on the page
