@@ -41,7 +41,7 @@ CLEAR = 2 / 3  # of the tolerance
 FAR_DEG = 30.0, 60.0
 FAR = "far"
 JUDGE, UNTRAINED, START, GATES = "result", "untrained", "mean over starts", ("fitness", "inlier_rmse")
-JUDGES: dict[bytes, ResultJudge] = {}
+JUDGES: dict[tuple[int, bytes], ResultJudge] = {}
 CLASSIFIER = GPCSettings(learning_rate=0.1, iterations=200)  # the config's model.classifier
 
 
@@ -126,7 +126,7 @@ def folds(family_N: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
 
 
 def judgment(samples: TrainingSet, learned: np.ndarray, asked: np.ndarray, tolerance: float) -> np.ndarray:
-    if (key := learned.tobytes()) not in JUDGES:  # one learns at all tolerances
+    if (key := (id(samples), learned.tobytes())) not in JUDGES:  # one learns at all tolerances
         JUDGES[key] = samples.subset(learned).judge()
     return samples.subset(asked).probabilities(JUDGES[key], tolerance)
 
