@@ -22,7 +22,7 @@ CORNERS = np.eye(3)
 @pytest.mark.parametrize(
     ("rows", "words"),
     [
-        ([0, 1], "of type list"),
+        ([0, 1.5], "of type list"),
         (np.array([0.0, 1.0]), "has type float64"),
         (np.zeros((2, 1), int), "has shape 2×1"),
         (np.array([0, 9]), "returns rows that a pool of 9 has not"),
