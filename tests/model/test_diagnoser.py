@@ -9,6 +9,7 @@ import pytest
 from gpca.causes.settings import CauseSettings
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
+from gpca.explainers.classifiers import BoostedQuestion
 from gpca.explainers.pair_classifier import Judgment, PairClassifier
 from gpca.model.diagnoser import Diagnoser, TrainingSet, judged_unseen, learn, threshold_of
 from gpca.model.diagnosis import Diagnosis, Reenacted, state_probabilities
@@ -52,6 +53,17 @@ def test_a_quick_diagnosis_reenacts_less_and_promises_nothing(diagnoser, cloud):
     said, _ = quick.diagnose(cloud, cloud[::2], np.eye(4))
     assert said.guarantee is None
     assert 1 <= len(said.reenacted.poses) <= 2
+
+
+def test_trees_have_a_say_where_a_registration_ended_and_none_on_a_pose_that_is_given(diagnoser, cloud):
+    alone = replace(diagnoser, judge=replace(diagnoser.judge, trees=None))
+    sure = replace(BoostedQuestion.fit(np.zeros((9, 2)), np.ones(9, bool)), baseline=60.0)
+    failing = replace(diagnoser, judge=replace(diagnoser.judge, trees=sure))
+    for register, result in (
+        (True, pytest.approx(1)),
+        (False, alone.diagnose(cloud, cloud[::2], np.eye(4), False)[0].result),
+    ):
+        assert failing.diagnose(cloud, cloud[::2], np.eye(4), register)[0].result == result
 
 
 NOTHING = Reenacted(0.1, {}, 0.0, 0.0, 0.0, poses=())
