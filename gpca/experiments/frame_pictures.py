@@ -38,7 +38,7 @@ from gpca.reporting.words import BOP_TITLES, object_of_frames
 from gpca.rigid import inverse, transform
 
 SECTION = "IV-E Real-world validation"
-LOST_TO = {OCCLUDER: "an occluder", HALF_SPACE: "a half-space"}
+LOST_TO = {OCCLUDER: "a simulated occluder", HALF_SPACE: "a half-space"}
 HEIGHT_IN = 2.4
 SMALLEST_PART = 0.02  # Smaller parts of an object's pixels lie at its rim, where no point was drawn.
 AROUND = (2.5, 1.2)  # The first picture, and the two others, show this many times the object's extent.
@@ -50,8 +50,8 @@ PANELS_PER_ROW = 5
 @figure(
     SECTION,
     "Figure 5: from a depth frame to an attribution",
-    """After Figure 5 of the paper: the object's region in a depth frame with what an occluder covers of it in black,
-    its points at the initial pose, after ICP, and GP-CA's scores beside the true cause. Errors are in % of the
+    """After Figure 5 of the paper: the object's region in a depth frame with what a simulated occluder covers of it in
+    black, its points at the initial pose, after ICP, and GP-CA's scores beside the true cause. Errors are in % of the
     object's diameter d. The occluder is the silhouette of another object of the dataset, moved over this one.
 
     Shown is a failure: of the test samples that an occluder covers, that GP-CA names correctly, and that ICP moved

@@ -78,6 +78,9 @@ def collect(_run: Run, files: Paths) -> Frame:
     return tidy(records, "learning curves")
 
 
+GUESSING = 25.0  # balanced accuracy in %, of four labels
+
+
 @figure(
     "Beyond the paper: what made a registration fail",
     "What an observer may reach: learning from more samples",
@@ -110,6 +113,9 @@ def learning_curve(run: Run, curves):
                 panel.fill_between(by_size.index, by_size["min"], by_size["max"], color=color, alpha=0.2, linewidth=0)
             reached = 100 * curve.loc[curve["learner"] == CEILING, metric].mean()
             panel.axhline(reached, color=GRAY, linestyle="--", label="truth from other starts (counterfactual access)")
+            if metric == "balanced_accuracy":
+                panel.axhline(GUESSING, color=GRAY, linestyle=":", label="guessing")
+                panel.set_ylim(0, 100)
             panel.set_xscale("log")
             panel.set_xticks(ticks, [f"{tick:g}" for tick in ticks], rotation=45)
             panel.xaxis.set_minor_locator(NullLocator())

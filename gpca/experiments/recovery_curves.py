@@ -20,7 +20,7 @@ ROW_IN, APART = 0.3, 0.13  # height of a row, and distance of its marks from the
     "Recovery over actions",
     """The share of failures that policies recover within one action and within all, and how many points more within one
     action than the best fixed sequence, which is chosen in hindsight. Bars are 95 % intervals of a bootstrap over
-    tables and seeds, on the right of the paired difference. The oracle knows the cause, but another action may help.""",
+    tables and seeds, on the right of the paired difference. The oracle knows the cause; another action may help.""",
     intervals="recovery_intervals.csv",
     differences="recovery_differences.csv",
 )

@@ -195,8 +195,11 @@ def scan_failures(run: Run, measured):
                     look["color"] = "white" if color == GRAY else "black"
                     panel.text(left + share / 2, place, str(of[part]), **look)
                 left += share
+            if of:
+                count = f"$n$ = {of['registrations']}"
+                panel.text(102, place, count, va="center", color=GRAY, fontsize=SMALL_PT)
         panel.set_yticks(range(len(strata)), [stratum_in_words(stratum) for stratum in strata])
-        panel.set_xlim(0, 100)
+        panel.set(xlim=(0, 122), xticks=range(0, 101, 25))  # behind the bars stands how many registrations they are of
         panel.tick_params(labelsize=SMALL_PT)
     for panel in grid[:, 0]:
         panel.set_ylabel("overlap", fontsize=SMALL_PT)

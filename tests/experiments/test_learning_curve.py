@@ -28,3 +28,6 @@ def test_curves_are_collected_as_means_over_the_orders_and_drawn(tmp_path, same_
     assert trees["value"].tolist() == pytest.approx([expected], abs=1e-5)
     curves = read_curves([tmp_path / "four/seed100.csv"])
     same_bytes(lambda: learning_curve(run(four="Four"), curves))
+    accuracy, _ = learning_curve(run(four="Four"), curves).axes
+    assert accuracy.get_ylim() == (0, 100)
+    assert "guessing" in [line.get_label() for line in accuracy.get_lines()]

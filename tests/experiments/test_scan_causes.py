@@ -157,6 +157,7 @@ def test_the_figure_has_a_panel_for_each_data_set_and_kind_of_start(measured):
     widths = [patch.get_width() for patch in figure.axes[0].patches if patch.get_y() < 0.3]
     assert sum(widths) == pytest.approx(100)
     assert any(width == pytest.approx(100 * of[NOMINAL] / of["registrations"]) for width in widths)
+    assert f"$n$ = {of['registrations']}" in [text.get_text() for text in figure.axes[0].texts]
     with pytest.raises(InputError, match="has no natural registrations of these data sets"):
         scan_failures(run_of("other"), measured)
 
