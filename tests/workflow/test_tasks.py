@@ -87,6 +87,8 @@ def test_a_severity_is_changed_an_explainer_dropped_and_a_bop_dataset_named(proj
     (dataset / "models").mkdir(parents=True)
     for name in ("foundationpose_mylab-test.csv", "models/models_info.json"):
         (dataset / name).touch()
+    (dataset / "test/000001").mkdir(parents=True)
+    (dataset / "test/000001/scene_gt.json").write_text('{"0": [{"obj_id": 1}]}')
     words = ["all", *SMOKE, *configs, "--config", f"data_dir={tmp_path}/lab"]
     planned = project.plan(*words).stdout
     assert set(re.findall(r"^register +(\d+)$", planned, re.MULTILINE)) == {"6"}  # two sources, three seeds
