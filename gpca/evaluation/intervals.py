@@ -102,14 +102,20 @@ def interval(
 
 
 def corrected(
-    value_M: np.ndarray, low_M: np.ndarray, high_M: np.ndarray, clusters_M: np.ndarray, picked: bool = True
+    value_M: np.ndarray,
+    low_M: np.ndarray,
+    high_M: np.ndarray,
+    clusters_M: np.ndarray,
+    picked: bool = True,
+    reach: float = np.inf,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the bounds of M differences, widened for few clusters and for the best being picked from all of them.
 
     The distance of each bound grows from the normal quantile to Student's with a degree of freedom less than there are
     clusters, at levels by Holm (1979) if the differences are picked from: the largest relative to its width at
     1 - 0.05 / M, the next at 1 - 0.05 / (M - 1), and so on to the first that is not shown, whose level the others
-    share. With fewer than `FEWEST_CLUSTERS`, all bounds reach 0. A difference without an interval keeps none.
+    share. With fewer than `FEWEST_CLUSTERS`, all bounds reach 0. A difference without an interval keeps none. No bound
+    is farther than `reach` from 0, the distance between the ends of what is compared.
     """
     from scipy.special import stdtrit
 
@@ -127,7 +133,7 @@ def corrected(
         left -= shown and picked
         if clusters_M[row] < FEWEST_CLUSTERS:
             low_M[row], high_M[row] = min(low_M[row], 0.0), max(high_M[row], 0.0)
-    return low_M, high_M
+    return np.maximum(low_M, -reach), np.minimum(high_M, reach)
 
 
 def quantile_bounds(values_B: np.ndarray, level: float = LEVEL) -> tuple[float, float]:

@@ -149,19 +149,22 @@ def compared(
     return rows
 
 
-def intervals(records: list[tuple], name: str) -> pd.DataFrame:
+def intervals(records: list[tuple], name: str, most: float = np.inf) -> pd.DataFrame:
     """Frame of `COLUMNS`, or of `KEYS`, `AGAINST` and `NUMBERS`; `name` says what the records are of.
 
     Differences have :func:`corrected <gpca.evaluation.intervals.corrected>` bounds: those from the best of several
-    methods, a kind in `PICKED`, for all methods that have one.
+    methods, a kind in `PICKED`, for all methods that have one. `most` is the largest difference that there can be, where
+    the records do not hold the measures themselves.
     """
     with_rivals = bool(records) and len(records[0]) > len(COLUMNS)
     rows = tidy(records, name, (*KEYS, *AGAINST, *NUMBERS) if with_rivals else COLUMNS, "run its step first")
     if with_rivals:
         keys = [*(key for key in KEYS if key != "method"), AGAINST[0]]
-        for (*_, kind), of in rows[rows[AGAINST[0]] != ""].groupby(keys, sort=False):
+        measured = rows[rows[AGAINST[0]] == ""].groupby(keys[:-1], sort=False)
+        reach = (measured["high"].max() - measured["low"].min()).dropna().to_dict()
+        for (*place, kind), of in rows[rows[AGAINST[0]] != ""].groupby(keys, sort=False):
             value_M, low_M, high_M, clusters_M = (of[name].to_numpy() for name in ("value", "low", "high", "clusters"))
-            bounds = corrected(value_M, low_M, high_M, clusters_M, kind in PICKED)
+            bounds = corrected(value_M, low_M, high_M, clusters_M, kind in PICKED, reach.get(tuple(place), most))
             rows.loc[of.index, ["low", "high"]] = np.column_stack(bounds)
     return rows
 

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from math import inf
 from typing import Any
 
+import numpy as np
+
 from gpca.declarations.plan import Run
 from gpca.declarations.result import Figure, Frame, Paths, figure, table
 from gpca.errors import InputError
@@ -189,7 +191,7 @@ def loophole(run: Run, intervals) -> Figure:
         there = [table for table in STEPS if table in by_table.index]
         values = 100 * by_table.loc[there, ["value", "low", "high"]].to_numpy(float)
         across = [list(STEPS).index(table) + SIDE * (k - (len(shown) - 1) / 2) for table in there]
-        spread = [values[:, 0] - values[:, 1], values[:, 2] - values[:, 0]]
+        spread = np.maximum([values[:, 0] - values[:, 1], values[:, 2] - values[:, 0]], 0)  # but for rounding
         look = {"color": colors[name], "marker": "o", "ms": 3.5, "lw": 1.2, "elinewidth": 0.8}
         panel.errorbar(across, values[:, 0], spread, label=explainers[name], **look)
         beside = {"va": "center", "fontsize": SMALL_PT, "color": colors[name]}

@@ -156,7 +156,7 @@ def collect_differences(run: Run, files: Paths) -> Frame:
                 if other in solved and other != name:
                     keys = (TABLE, TABLE, name, f"recovered_within_{k}", ALL, against, other)
                     records.append(draws.record(keys, draws.difference(solved[name], solved[other])))
-    return intervals(records, "recovery")
+    return intervals(records, "recovery", most=1.0)
 
 
 def steps_taken(failures: Frame) -> Series:

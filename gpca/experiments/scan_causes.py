@@ -213,9 +213,14 @@ def collect(run: Run, causes_files: Paths, sample_files: Paths, prediction_files
                 rows += _measures((source, condition, EVERY), parts, seen["cluster"][mask_N].to_numpy(str))
     collected = pd.DataFrame(rows, columns=list(COLUMNS))
     leads, bounds = collected[collected["gate"] != ""], ["difference_low", "difference_high"]
-    for _, of in leads.groupby(["source", "condition", "stratum", "metric"], sort=False):
+    keys = ["source", "condition", "stratum", "metric"]
+    measured = collected.groupby(keys)
+    reach = (measured["high"].max() - measured["low"].min()).dropna().to_dict()
+    for key, of in leads.groupby(keys, sort=False):
         value_M, low_M, high_M, clusters_M = (of[name].to_numpy(float) for name in ("difference", *bounds, "clusters"))
-        collected.loc[of.index, bounds] = np.column_stack(corrected(value_M, low_M, high_M, clusters_M))
+        collected.loc[of.index, bounds] = np.column_stack(
+            corrected(value_M, low_M, high_M, clusters_M, reach=reach.get(key, np.inf))
+        )
     return collected
 
 

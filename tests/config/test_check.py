@@ -33,6 +33,8 @@ def test_local_data_comes_before_the_download(tmp_path):
     (tmp_path / "bop/lm/models").mkdir(parents=True)
     for number in range(1, 16):
         (tmp_path / f"bop/lm/models/obj_{number:06d}.ply").write_text("ply")
+    (tmp_path / "bop/lm/test/000001").mkdir(parents=True)
+    (tmp_path / "bop/lm/test/000001/scene_gt.json").write_text("{}")
     linemod, ycb = map(run_config.check(load("bop") | {"data_dir": str(tmp_path)}).get, ("linemod", "ycb"))
     assert (linemod["origin"], linemod["location"], ycb["origin"]) == ("local", str(tmp_path / "bop/lm"), "download")
 
