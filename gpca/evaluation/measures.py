@@ -153,8 +153,8 @@ def intervals(records: list[tuple], name: str, most: float = np.inf) -> pd.DataF
     """Frame of `COLUMNS`, or of `KEYS`, `AGAINST` and `NUMBERS`; `name` says what the records are of.
 
     Differences have :func:`corrected <gpca.evaluation.intervals.corrected>` bounds: those from the best of several
-    methods, a kind in `PICKED`, for all methods that have one. `most` is the largest difference that there can be, where
-    the records do not hold the measures themselves.
+    methods, a kind in `PICKED`, for all methods that have one. `most` is the largest difference that there can be,
+    where the records do not hold the measures themselves.
     """
     with_rivals = bool(records) and len(records[0]) > len(COLUMNS)
     rows = tidy(records, name, (*KEYS, *AGAINST, *NUMBERS) if with_rivals else COLUMNS, "run its step first")

@@ -177,8 +177,9 @@ class Scans:
         """Return how badly both scans fit at a pose: the mean over their points, from 0 to 1.
 
         The nearest point counts if its normal agrees, by the squared distance from its plane; two walls that cross or
-        slide along each other are close, but not alike. Flat scans count by the squared distance. Points where the
-        other scan may have seen nothing count little, or a pose would fit the better, the more the scans overlap there.
+        slide along each other are close, but not alike. Points where the other scan may have seen nothing count
+        little, or a pose would fit the better, the more the scans overlap there. Flat scans count by the squared
+        distance, and in full.
         """
         source_normals, target_normals = self._normals
         moved = transform(T, self.source)
@@ -188,9 +189,9 @@ class Scans:
 
     def _unlike(self, points: Oriented, others: Oriented, tree: cKDTree) -> float:
         distance_N, row_N = tree.query(points[0])
+        if points[1] is None or others[1] is None:  # a flat scan has few surfaces, and each of them tells
+            return float(np.minimum(np.square(distance_N / self.voxel), 1).mean())
         unmatched_N = np.where(distance_N > UNSEEN * self.voxel, UNSEEN_MISFIT, 1.0)
-        if points[1] is None or others[1] is None:
-            return float(np.minimum(np.square(distance_N / self.voxel), unmatched_N).mean())
         normals_N_3 = others[1][row_N]
         alike_N = (distance_N < PARTNER * self.voxel) & (np.abs(dots(points[1], normals_N_3)) > ALIKE)
         from_plane_N = dots(points[0] - others[0][row_N], normals_N_3) / (AWAY * self.voxel)

@@ -19,6 +19,7 @@ FREE = {  # what a user may take from anywhere
     ("shift", "--other-registrations"),
     ("new_concepts", "--encoders"),
     ("label", "registrations.npz"),
+    ("learning_curve", "--samples"),  # it learns from further samples of all sources
 }
 ELSEWHERE = ("elsewhere", 7)
 
