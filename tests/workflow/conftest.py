@@ -26,7 +26,7 @@ NEEDED = ("Snakefile", "config", "gpca", "baselines", "workflow", "profiles", "e
 # The rules that nearly every other one leads to.
 ENDS = (
     *("comparison", "claims", "page", "reading", "reading_values", "readings", "table13_readings"),
-    *("judge_joint", "table16_joint_reading"),
+    *("judge_joint", "table16_joint_reading", "verdicts"),
 )
 
 

@@ -17,7 +17,7 @@ KEYS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("suffix", "files"), {".npz": 13, ".pt": 2, ".csv": 14}.items())
+@pytest.mark.parametrize(("suffix", "files"), {".npz": 15, ".pt": 2, ".csv": 14}.items())
 def test_cores_and_interruptions_change_no_byte(smoke, killed_and_continued, suffix, files):
     # Besides its own results the source needs registrations of another one.
     runs = (smoke.results(suffix), killed_and_continued.project.results(suffix))

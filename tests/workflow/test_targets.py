@@ -115,8 +115,8 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
     ),
     "gpca/uncertainty/estimators/analytic.py": ("estimates/ exchange/ estimators.csv", "uncertainty/ causes/ methods/"),
     "baselines/descriptors.py": ("diagnoses/ycb/pair_forest table9_causes", "predictions"),
-    "gpca/steps/control_samples.py": ("controls/ control_embeddings/ transfer", "predictions embeddings encoders"),
-    "gpca/experiments/controls.py": ("controls.csv table10_controls transfer", "controls/ predictions diagnoses/"),
+    "gpca/steps/control_samples.py": ("controls/ control_embeddings/ loophole", "predictions embeddings encoders"),
+    "gpca/experiments/controls.py": ("controls.csv table10_controls loophole", "controls/ predictions diagnoses/"),
     "gpca/uncertainty/estimators/substitute.py": ("exchange/ table14_method_matrix", "estimates/ methods/ predictions"),
 }
 
