@@ -100,6 +100,13 @@ def module_outside(variable: str, kind: str, of: type, name: str) -> str | None:
     return next((module for module, entries in outside.items() if name in entries), None)
 
 
+def names_outside() -> set[str]:
+    """Return the names of all entries of plugins, of any kind."""
+    modules = [load(name) for name in named()]
+    modules += [_imported(name, package) for group in GROUPS for package, name in _announced(group)]
+    return {name for module in modules for variable in VARIABLES for name in getattr(module, variable, {})}
+
+
 def is_outside(module: str) -> bool:
     """Return whether a module is not part of the suite."""
     return module.partition(".")[0] not in ("gpca", "baselines")

@@ -44,7 +44,15 @@ def test_a_folder_of_meshes_and_a_rule_of_an_own_source_become_rows(finished, pl
     assert {"objects_my_parts", "table1_extended", "table5_shift", "table10_transfer", "model"} < again.jobs.keys()
     # What was learned from the two other sources is asked about the new one too, and the one before it is seen by it.
     of_others = {path for path in again.outputs if "/ycb/" in path}
-    taught_by_others = ("control", "diagnoses", "new_concepts", "estimate", "estimator_", "reference_samples")
+    taught_by_others = (
+        "control",
+        "diagnoses",
+        "learning_curve",
+        "new_concepts",
+        "estimate",
+        "estimator_",
+        "reference_samples",
+    )
     assert not [path for path in of_others if not any(word in path for word in taught_by_others)]
     assert not again.jobs.keys() & {"fit_kernel_grid", "explain_exchanged", "recover", "render_scenes"}
     assert "results/smoke/predictions/my_parts/gpca/seed1.csv" in again.outputs

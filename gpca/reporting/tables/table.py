@@ -16,6 +16,7 @@ from typing import Any
 from gpca.evaluation.intervals import TRIVIAL
 from gpca.evaluation.measures import POOLED
 from gpca.io.files import whole_file, write_text
+from gpca.process.plugins import names_outside
 
 EMPTY = "–"  # where there is no number
 LEAST_SEEDS = 3  # A mean over fewer has no interval: that of two spans everything, however near they lie.
@@ -244,7 +245,8 @@ def _main(table: Table) -> list[str]:
 
 
 def _best_rows(table: Table, rows: Sequence[int], score: str) -> Iterator[int]:
-    """Yield at most `MOST_ROWS` rows: of each group that competes in a column the best, and the paper's; then others.
+    """Yield at most `MOST_ROWS` rows: of each group that competes in a column the paper's, a user's and the best; then
+    others.
 
     Where several groups compete, such as datasets, the best of the others follows each.
     """
@@ -265,8 +267,9 @@ def _best_rows(table: Table, rows: Sequence[int], score: str) -> Iterator[int]:
     others.sort(key=lambda row: bool(names(row) & set(TRIVIAL)))
     beside = others[: MOST_ROWS // 3] if len(groups) == 1 else []
     each = max(1, (MOST_ROWS - len(beside)) // len(groups) - (len(groups) > 1 and bool(others)))
+    stays = {PAPERS, *names_outside()}
     for group in groups[:MOST_ROWS]:
-        best = sorted(group, key=lambda row: (PAPERS not in names(row), -worth(row)))[:each]
+        best = sorted(group, key=lambda row: (not names(row) & stays, -worth(row)))[:each]
         yield from sorted(best, key=worth, reverse=True)
         if len(groups) > 1:
             yield from sorted([row for row in others if table.rows[row][0] == table.rows[group[0]][0]], key=worth)[-1:]

@@ -49,6 +49,16 @@ def test_of_many_rows_those_of_each_dataset_the_rule_and_the_papers_stay():
     assert len(short(large(methods, ("pooled",))).rows) == MOST_ROWS
 
 
+def test_the_row_of_a_plugin_stays_however_it_ranks(tmp_path, monkeypatch):
+    (tmp_path / "my_plugin_of_tables.py").write_text("EXPLAINERS = {'net0': None}\n")
+    methods = ["oracle", "gpca", *(f"net{k}" for k in range(20)), "rule"]
+    assert "net0" not in {key for labels in short(large(methods, ("pooled",))).rows for key, _ in labels}
+    monkeypatch.setattr("gpca.process.plugins.named", lambda: [str(tmp_path / "my_plugin_of_tables.py")])
+    monkeypatch.syspath_prepend(str(tmp_path))
+    shown = [key for labels in short(large(methods, ("pooled",))).rows for key, _ in labels]
+    assert {"net0", "gpca", "net19"} <= set(shown)
+
+
 def test_small_tables_and_lists_of_words_are_whole():
     cells, columns = {(0, "n"): Cell(1, 0, 3, 9)}, {"n": Column("n")}
     small = Table("claims", "What", {"a": "A"}, ((("x", "X"),),), "metric", columns, cells)
