@@ -9,7 +9,7 @@ import baselines
 from gpca.causes.settings import DescriptorSettings
 from gpca.errors import InputError
 from gpca.explainers.gpca import GPCA
-from gpca.explainers.interface import WORDS, ExplainerEntry, icp_calls, in_words
+from gpca.explainers.interface import REENACTED, WORDS, ExplainerEntry, icp_calls, in_words
 from gpca.explainers.registry import CAUSES, explainer_entry, explainers
 from gpca.explainers.registry import CONCEPTS as CONCEPTS_KIND
 from gpca.pairs.perturbation import CONCEPTS
@@ -47,7 +47,7 @@ def test_every_entry_can_be_headed_and_fed():
         assert (explainer_entry(name).reads, explainer_entry(name).oracle) == ("embeddings", False)
     for name, entry in explainers().items():
         assert entry.title, name
-        assert entry.reads in ("registrations", "embeddings") or entry.design in DESIGNS, name
+        assert entry.reads in ("registrations", "embeddings", REENACTED) or entry.design in DESIGNS, name
         assert ("oracle" in entry.title) == entry.oracle, name
 
 
@@ -58,7 +58,7 @@ def test_every_entry_says_what_it_sees(kind):
         assert "source" in entry.sees or entry.reads != "embeddings", name
         assert ("truth" in entry.sees) == entry.oracle, name
         if kind == CONCEPTS_KIND:  # what runs ICP again reads the outcomes, and reads them for that alone
-            assert bool({"runs", "remedies"} & set(entry.sees)) == bool(entry.design), name
+            assert bool({"runs", "remedies"} & set(entry.sees)) == bool(entry.design or entry.reads == REENACTED), name
     assert [name for name, entry in explainers(kind).items() if not entry.sees] == ["chance", "most_frequent"]
 
 
