@@ -60,12 +60,8 @@ def named() -> list[str]:
 def entries_outside(variable: str, kind: str, of: type, taken: Iterable[str]) -> dict[str, dict[str, Any]]:
     """Return the entries that plugins list in a variable of `GROUPS`, by module."""
     group = next(group for group, variables in GROUPS.items() if variable in variables)
-    modules = [load(name) for name in named()]
-    for package, name in _announced(group):
-        modules.append(_imported(name, f"plugin {name} of the package {package}"))
-        _remember(modules[-1])
     names, outside = set(taken), {}
-    for module_name, module in {module.__name__: module for module in modules}.items():
+    for module_name, module in _modules([group]).items():
         entries = getattr(module, variable, {})
         if not isinstance(entries, Mapping):
             raise InputError(module_name, f"{variable} is not a mapping", f"give names, each with its {of.__name__}")
@@ -88,6 +84,15 @@ def entries_outside(variable: str, kind: str, of: type, taken: Iterable[str]) ->
     return outside
 
 
+def _modules(groups: Iterable[str]) -> dict[str, ModuleType]:
+    """Return the plugins of the config, and those that installed packages announce in some groups, by name."""
+    modules = [load(name) for name in named()]
+    for package, name in (announced for group in groups for announced in _announced(group)):
+        modules.append(_imported(name, f"plugin {name} of the package {package}"))
+        _remember(modules[-1])
+    return {module.__name__: module for module in modules}
+
+
 def joined_outside(variable: str, kind: str, of: type, entries: Mapping[str, Any]) -> dict[str, Any]:
     """Return the suite's entries of a kind and those of plugins, by name."""
     outside = entries_outside(variable, kind, of, entries)
@@ -102,8 +107,7 @@ def module_outside(variable: str, kind: str, of: type, name: str) -> str | None:
 
 def names_outside() -> set[str]:
     """Return the names of all entries of plugins, of any kind."""
-    modules = [load(name) for name in named()]
-    modules += [_imported(name, package) for group in GROUPS for package, name in _announced(group)]
+    modules = _modules(GROUPS).values()
     return {name for module in modules for variable in VARIABLES for name in getattr(module, variable, {})}
 
 

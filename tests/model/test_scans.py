@@ -195,7 +195,7 @@ def test_an_estimator_that_fails_is_a_note(scans):
 
 
 def apart(share, seed=0):
-    """Two scans, each of such a share of the room, from opposite ends."""
+    """Two scans from opposite ends of a room, each of this share of it."""
     return transform(inverse(TRUE), room(seed, 0.0, share)), room(seed + 1, 1 - share, 1.0)
 
 
