@@ -88,7 +88,7 @@ def _modules(groups: Iterable[str]) -> dict[str, ModuleType]:
     """Return the plugins of the config, and those that installed packages announce in some groups, by name."""
     modules = [load(name) for name in named()]
     for package, name in (announced for group in groups for announced in _announced(group)):
-        modules.append(_imported(name, f"plugin {name} of the package {package}"))
+        modules.append(imported(name, f"plugin {name} of the package {package}"))
         _remember(modules[-1])
     return {module.__name__: module for module in modules}
 
@@ -120,7 +120,7 @@ def load(name: str) -> ModuleType:
     """Import a file by its path, or a module that is installed or below the working directory."""
     if not name.endswith(".py"):
         sys.path += [str(Path.cwd())] * (str(Path.cwd()) not in sys.path)  # searched last
-        module = _imported(name, name)
+        module = imported(name, name)
         if is_outside(name):
             _remember(module)
         return module
@@ -136,7 +136,7 @@ def load(name: str) -> ModuleType:
     if other not in (None, path):
         raise InputError(name, f"has the name of another module, {other}", "rename it")
     sys.path += [str(path.parent)] * (str(path.parent) not in sys.path)
-    module = _imported(path.stem, name)
+    module = imported(path.stem, name)
     _remember(module)
     return module
 
@@ -163,13 +163,17 @@ def _announced(group: str) -> tuple[tuple[str, str], ...]:
     return tuple((point.dist.name if point.dist else point.name, point.module) for point in points)
 
 
-def _imported(module: str, subject: str) -> ModuleType:
+def imported(module: str, subject: str) -> ModuleType:
+    """Import a user's module and what it imports; nothing compiled is left in the user's folder."""
+    before, sys.dont_write_bytecode = sys.dont_write_bytecode, True
     try:
         return import_module(module)
     except InputError:
         raise
     except (Exception, SystemExit) as fault:  # of a user's code
         raise InputError(subject, f"cannot be imported ({type(fault).__name__}: {fault})", "correct it") from fault
+    finally:
+        sys.dont_write_bytecode = before
 
 
 def _remember(module: ModuleType) -> None:

@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import Any, Generic, TypeVar
 
 from gpca.errors import require_known
-from gpca.process.plugins import entries_outside
+from gpca.process.plugins import entries_outside, imported, is_outside
 
 Entry = TypeVar("Entry")
 
@@ -53,4 +53,4 @@ class Registry(Generic[Entry]):
 def load(name: str) -> Any:
     """Return the function or class that ``module:name`` names."""
     module, _, member = name.partition(":")
-    return getattr(import_module(module), member)
+    return getattr(imported(module, name) if is_outside(module) else import_module(module), member)

@@ -14,6 +14,7 @@ from gpca.experiments.run import names_of
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module, explainers
 from gpca.process.code_files import code_files
 from gpca.process.plugins import load, named, use
+from gpca.process.registry import load as load_member
 
 from ..config.configs import load as load_config
 from ..plugins_apart import lies_outside
@@ -167,9 +168,12 @@ def test_a_package_that_cannot_be_imported_is_named(folder, monkeypatch):
         methods()
 
 
-def test_a_file_is_imported_once(folder):
-    write(folder, {"once": "SOURCES = {}\n"})
+def test_a_file_is_imported_once_and_leaves_nothing_in_its_folder(folder, monkeypatch):
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    write(folder, {"once": "import beside\nENCODERS = {'own': 'net:Net'}\n", "beside": "", "net": "Net = dict\n"})
     assert load("once.py") is load(str(folder / "once.py")) is sys.modules["once"]
+    assert load_member("net:Net") is dict
+    assert {path.name for path in folder.iterdir()} == {"once.py", "beside.py", "net.py"}
 
 
 def test_the_tests_forget_plugins_and_no_module_of_a_library(folder):
