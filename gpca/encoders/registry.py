@@ -17,7 +17,6 @@ ENCODERS = {
     "pointnet2": "gpca.encoders.pointnet:PointNet2",
     "pointnext": "gpca.encoders.pointnet:PointNeXt",
 }
-DIFFERENTIABLE = ("dgcnn", "pointnet")  # backbones with a gradient in the points on the CPU, once trained
 OF_ANY_SIZE = ("dgcnn",)  # backbones that take clouds of different sizes in one batch
 
 

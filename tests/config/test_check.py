@@ -171,8 +171,6 @@ FAULTS = [
     ("model.source", "lab", "model.source: no source 'lab'; choose one of coffee_cup, linemod, ycb, real_rgbd"),
     ("model.encoder", "voxelnet", "model.encoder: no encoder 'voxelnet'; choose one of dgcnn"),
     ("runtime.repeats", 1, "runtime.repeats: 1 should be greater than or equal to 2"),
-    ("gradients.deleted", [], "gradients.deleted: is empty; name at least 1"),
-    ("gradients.deleted", [0.1, 0.98], "gradients.deleted: deleting 0.98 of 512 points leaves fewer than the encoder"),
     ("kernel_grid.sources", ["ycbv"], "kernel_grid.sources: no source 'ycbv'; choose one of coffee_cup, linemod, ycb"),
     ("learners.learner_tree", {}, "learners.learner_tree: explainer 'learner_tree': unknown; choose one of gpca_paper"),
     ("learners.learner_forest", {"tree": 3}, "learners.learner_forest: explainer 'learner_forest': setting tree: unk"),

@@ -31,8 +31,8 @@ STEPS = {  # module of gpca.steps -> the steps that it has, functions of their n
     "shifts": "draw_shift=draw observe_shift=observe diagnose_shifts=diagnose",
 }
 MODULES = {  # modules with a function ``run``
-    **{name: f"gpca.steps.{name}" for name in ("exchange", "frame_labels", "gradients", "guarantee", "kernel_grid")},
-    **{name: f"gpca.steps.{name}" for name in ("live_shap", "new_concepts", "runtime")},
+    **{name: f"gpca.steps.{name}" for name in ("exchange", "frame_labels", "guarantee", "kernel_grid")},
+    **{name: f"gpca.steps.{name}" for name in ("new_concepts", "runtime")},
     "estimate": "gpca.steps.estimates",
     "recover": "gpca.steps.recovery",
     "register_methods": "gpca.steps.registration_trials",
@@ -51,10 +51,8 @@ LISTS = {  # which names of a step are lists, and not of one seed, file or name
     "estimate": "seeds estimators estimates causes other_objects other_causes samples rows timings",
     "diagnose_frames": "causes descriptors reenactments encoders embeddings",
     "frame_labels": "backbones embeddings strategies out",
-    "gradients": "seeds registrations encoders embeddings deletions tcav",
     "kernel_grid": "seeds registrations embeddings out predictions",
     "learning_curve": "causes descriptors samples",
-    "live_shap": "seeds registrations outcomes out",
     "oracles": "predictions",
     "new_concepts": "encoders encoders_of strategies out",
     "shift": "seeds registrations other_registrations embeddings encoders out",

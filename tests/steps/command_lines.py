@@ -176,12 +176,6 @@ STEP_OPTIONS = {
         "--registrations": "registrations.npz", "--embeddings": "embeddings.npz", "--input-timings": "dgcnn.csv",
         "--predictions": "predictions.csv", "--timings": "gpca.csv",
     },
-    "gradients": COMMON | {
-        "--settings": {"gradients": {"samples": 3, "deleted": [0.25], "vectors": 2}, "encoder": ENCODER,
-                       "gpc": FEW},
-        "--seeds": 0, "--registrations": "registrations.npz", "--encoders": "weights.pt",
-        "--embeddings": "embeddings.npz", "--deletions": "deletions.csv", "--tcav": "tcav.csv",
-    },
     "without": COMMON | {
         "--settings": ENCODER | {"epochs": 1}, "--seed": 0, "--registrations": "registrations.npz",
         "--concepts": ["noise", "overlap"], "--out": "without.npz",

@@ -11,12 +11,12 @@ from tests.steps.by_words import main, module_of, run_apart
 
 from .command_lines import STEP_OPTIONS, arguments
 
-# tests/frames/test_steps.py, tests/steps/test_frame_causes.py, test_live_shap.py, test_recover.py,
+# tests/frames/test_steps.py, tests/steps/test_frame_causes.py, test_recover.py,
 # readings/test_step.py, test_joint.py and test_ship.py, tests/comparison/test_reference.py,
 # tests/steps/test_guarantee.py and test_shifts.py, tests/page/test_two_runs.py
 ELSEWHERE = {
     *("scenes", "instances", "frame_registrations", "frame_causes", "reenact_frames", "diagnose_frames"),
-    *("guarantee", "live_shap", "recover", "readings", "ship"),
+    *("guarantee", "recover", "readings", "ship"),
     *("retrain", "join_repeats", "measure_joint", "choose_joint", "apply_joint"),
     *("scan_causes", "diagnose_scans", "draw_shift", "observe_shift", "diagnose_shifts"),
     *("check-config", "check-reference", "bench", "score", "leaderboard", "compare", "ship-predictions"),

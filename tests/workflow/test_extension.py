@@ -18,8 +18,8 @@ OLD_ROW = "coffee_cup"  # a source that no setting of the smoke run names
 
 
 def files_of(source, planned):
-    """The planned files of a source, under the name of the old row; live_shap is of the first source alone."""
-    parts = [path.split("/") for path in planned.outputs if "/live_shap/" not in path]
+    """The planned files of a source, under the name of the old row."""
+    parts = [path.split("/") for path in planned.outputs]
     return {"/".join(OLD_ROW if part == source else part for part in path) for path in parts if source in path}
 
 

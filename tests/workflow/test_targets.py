@@ -65,7 +65,7 @@ def test_a_table_needs_its_own_stages_alone(planned, table):
 EDITS = {  # a module: what is made again where it has changed, and what is not
     "gpca/classifier/gpc.py": (
         "predictions/ycb/gpca/ predictions/real_rgbd/gpca_pair diagnoses/ycb/gpca active_learning/ycb kernels/ "
-        "learners/ model.pt recovery/ controls/ exchange/ new_concepts/ saliency/ table2_per_concept fig4_pipeline",
+        "learners/ model.pt recovery/ controls/ exchange/ new_concepts/ table2_per_concept fig4_pipeline",
         "registrations encoders/ embeddings/ uncertainty/ methods/ estimates/ descriptors/ shifted/ residuals_forest "
         "predictions/ycb/shap_additive predictions/ycb/softmax_head diagnoses/ycb/gate_rmse fig3_concepts",
     ),
@@ -101,7 +101,7 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
     ),
     "gpca/encoders/dgcnn.py": (
         "encoders/ycb embeddings/ycb predictions/ycb/gpca/ predictions/ycb/concept_vectors shifted/ cause_encoders/ycb "
-        "control_embeddings/ saliency/ table2_per_concept",
+        "control_embeddings/ table2_per_concept",
         "registrations uncertainty/ causes/ descriptors predictions/real_rgbd/gpca_pair residuals_forest methods/",
     ),
     "gpca/objects/point_files.py": ("runtime.csv", "objects/ predictions embeddings registrations"),
@@ -170,7 +170,7 @@ def test_a_finished_run_has_nothing_to_do_nor_has_one_with_a_touched_but_unchang
 def test_a_changed_setting_reruns_what_depends_on_it(finished):
     (finished.folder / "mine.yaml").write_text(json.dumps({"explainers": {"gpca": {"iterations": 21}}}))
     planned = finished.dry_run(*SMOKE, "mine.yaml")
-    again = "predictions/ycb/gpca/ predictions/real_rgbd learners/ model.pt recovery/ saliency/ table2_per_concept"
+    again = "predictions/ycb/gpca/ predictions/real_rgbd learners/ model.pt recovery/ table2_per_concept"
     for word in again.split():
         assert any(word in path for path in planned.outputs), word
     assert not planned.jobs.keys() & {
