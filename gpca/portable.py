@@ -24,12 +24,6 @@ def logarithm(positive: Tensor) -> Tensor:
     return positive.new_ones(()).xlogy(positive)
 
 
-def log_sum_exp(values_N_C: Tensor) -> Tensor:
-    """Return the logarithm of the sum of the exponentials of each row, in place of ``torch.logsumexp``."""
-    largest_N = values_N_C.detach().amax(dim=1)
-    return largest_N + logarithm((values_N_C - largest_N[:, None]).exp().sum(dim=1))
-
-
 class Adam:
     """Adam (Kingma and Ba 2015), or AdamW with a weight decay, with the bits of torch's fused classes.
 

@@ -155,17 +155,6 @@ class GPC:
         """Return mean and standard deviation (N, C) of the independent latent logits q(f(h))."""
         return self._latents.marginals(self.project(h_N_d))
 
-    def mean_logits(self, h_N_d: torch.Tensor) -> torch.Tensor:
-        """Return the means (N, C) of the latent logits, differentiable in the embeddings."""
-        import torch
-
-        scaled_N_d = (h_N_d - torch.from_numpy(self._scaler.mean_d)) / torch.from_numpy(self._scaler.scale_d)
-        inducing_M_d = torch.from_numpy(self._prior.inducing_M_d).double()
-        weights_C_M = torch.from_numpy(self._prior.inducing_weights(self._latents.mean_C_M))
-        return torch.einsum(
-            "cmn,cm->nc", self._prior.covariance.between(inducing_M_d, scaled_N_d.double()), weights_C_M
-        )
-
     def attribute(self, h_N_d: np.ndarray | Projection) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return scores_N_C, variances_N_C and bald_N from M posterior draws (Eqs. 4, 5, 7).
 

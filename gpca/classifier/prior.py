@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, get_args
+from typing import get_args
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -36,25 +36,17 @@ class Covariance:
         parameter = DEFAULT if form == "polynomial" else lengthscale
         return cls(form, np.full(n_classes, DEFAULT), np.full(n_classes, parameter))
 
-    def between(self, a_A_d: Any, b_B_d: Any) -> Any:
-        """Return k_c(a, b), (C, A, B), of arrays, or of tensors with their gradients."""
-        xp: Any = np
-        root: Callable[[Any], Any] = np.sqrt
-        if not isinstance(a_A_d, np.ndarray):
-            import torch
-
-            from gpca.portable import square_root
-
-            xp, root = torch, square_root
-        scale_C_1_1, parameter_C_1_1 = (xp.asarray(part[:, None, None]) for part in (self.scale_C, self.parameter_C))
+    def between(self, a_A_d: np.ndarray, b_B_d: np.ndarray) -> np.ndarray:
+        """Return k_c(a, b), (C, A, B)."""
+        scale_C_1_1, parameter_C_1_1 = self.scale_C[:, None, None], self.parameter_C[:, None, None]
         if self.form == "polynomial":  # divided by d, as plain inner products of some hundred dimensions learn nothing
             return scale_C_1_1 * (a_A_d @ b_B_d.T / a_A_d.shape[1] + parameter_C_1_1) ** 2
         squared_A_B = ((a_A_d * a_A_d).sum(1)[:, None] + (b_B_d * b_B_d).sum(1) - 2 * a_A_d @ b_B_d.T).clip(min=0)
         if self.form == "matern32":
-            # The root of zero has an infinite derivative, so the squares stay above it.
-            scaled_C_A_B = root(squared_A_B.clip(min=1e-15)) * (math.sqrt(3) / parameter_C_1_1)
-            return scale_C_1_1 * (1 + scaled_C_A_B) * xp.exp(-scaled_C_A_B)
-        return scale_C_1_1 * xp.exp(squared_A_B * (-0.5 / parameter_C_1_1**2))
+            # As in training, where the root of zero has an infinite derivative.
+            scaled_C_A_B = np.sqrt(squared_A_B.clip(min=1e-15)) * (math.sqrt(3) / parameter_C_1_1)
+            return scale_C_1_1 * (1 + scaled_C_A_B) * np.exp(-scaled_C_A_B)
+        return scale_C_1_1 * np.exp(squared_A_B * (-0.5 / parameter_C_1_1**2))
 
     def variance(self, a_A_d: np.ndarray) -> np.ndarray:
         """Return k_c(a, a), (C, A)."""
@@ -85,11 +77,6 @@ class Prior:
         weights_C_M_N = np.stack([solve_triangular(L, K, lower=True) for L, K in pairs])
         residual_C_N = self.covariance.variance(double_N_d) + JITTER - np.square(weights_C_M_N).sum(axis=1)
         return Projection(inputs_N_d, np.swapaxes(weights_C_M_N, 1, 2), np.maximum(residual_C_N, 0))
-
-    def inducing_weights(self, mean_C_M: np.ndarray) -> np.ndarray:
-        """Return L⁻ᵀ mean (C, M): the latents' means are its products with k(Z, x)."""
-        pairs = zip(self._cholesky_C_M_M, mean_C_M, strict=True)
-        return np.stack([solve_triangular(L.T, mean_M) for L, mean_M in pairs])
 
     def grow(self) -> Prior:
         """Add a covariance whose parameters are the geometric means of the others'."""

@@ -49,8 +49,7 @@ class DGCNN(nn.Module):
             x_B_N_F, sizes = clouds, None
         else:
             x_B_N_F, sizes = torch.cat(list(clouds))[None], [len(cloud) for cloud in clouds]
-        wants_gradient = torch.is_grad_enabled() and x_B_N_F.requires_grad
-        if x_B_N_F.device.type == "cpu" and not self.training and not wants_gradient:
+        if x_B_N_F.device.type == "cpu" and not self.training:
             weights = {name: part.detach().numpy() for name, part in self.state_dict().items()}
             return torch.from_numpy(embed_clouds(weights, self.k, x_B_N_F.detach().contiguous().numpy(), sizes))
         return self.by_layers(x_B_N_F, sizes)
@@ -153,7 +152,7 @@ class _EdgeMax(torch.autograd.Function):
 
 
 def _edge_max_plain(ac_B_N_2F: torch.Tensor, neighbors_B_N_k: torch.Tensor, norm: nn.BatchNorm1d) -> torch.Tensor:
-    """Evaluate the layer with torch operations, on a GPU or for the gradient of a trained layer in its inputs."""
+    """Evaluate the layer with torch operations, on a GPU or of a trained layer."""
     a_B_N_F, c_B_N_F = ac_B_N_2F.chunk(2, dim=-1)
     batch, n, k = neighbors_B_N_k.shape
     rows = (neighbors_B_N_k + n * torch.arange(batch, device=ac_B_N_2F.device)[:, None, None]).reshape(-1)

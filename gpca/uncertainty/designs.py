@@ -176,28 +176,3 @@ def evaluate_design(
     uncertainty_S_K = divergence(clean, columns["covariance"], settings.floor)
     outcomes = Outcomes(sample=observed.sample, split=observed.split, uncertainty=uncertainty_S_K, **columns)
     return outcomes, seconds_S_K, icp_seconds_S_K
-
-
-class LiveUncertainty:
-    """u(noise, spread, overlap) of an observed pair in nats, as in the table of design ``additive``; nothing is kept.
-
-    `icp_calls` counts the runs of ICP so far, those of the clean run included.
-    """
-
-    def __init__(
-        self, registrations: Registrations, row: int, source: str, seed: int, settings: UncertaintySettings
-    ) -> None:
-        self.icp_calls, self._floor = 0, settings.floor
-        draws = draws_of(registrations, row, source, seed, settings)
-        pair = RegisteredRow(registrations.without_labels(), row)
-        self._runs = KnobRuns(pair.observed(settings.icp_points, draws.random), draws)
-        self._clean_6_6 = self._covariance(UNTOUCHED)
-
-    def __call__(self, knobs: Knobs) -> float:
-        """Register from all starts with the knobs as given; one outside its range raises an InputError."""
-        return float(divergence(self._clean_6_6, self._covariance(knobs), self._floor))
-
-    def _covariance(self, knobs: Knobs) -> np.ndarray:
-        runs, _ = self._runs.runs(knobs)
-        self.icp_calls += runs.icp_calls
-        return runs.covariance(self._runs.T_ref)

@@ -33,12 +33,10 @@ def test_covariances_and_their_gradients_are_gpytorchs(name):
 
 
 @pytest.mark.parametrize("name", COVARIANCES)
-def test_a_learned_covariance_is_the_same_on_arrays_and_tensors_in_double_precision(name):
+def test_a_learned_covariance_is_the_same_on_arrays_in_double_precision(name):
     learned = LearnedCovariance(unlike(name))
-    covariance, inputs = learned.learned(), (A.double(), B.double())
-    on_arrays_C_A_B = covariance.between(*(part.numpy() for part in inputs))
-    assert on_arrays_C_A_B == pytest.approx(learned(A, B).detach().numpy(), abs=1e-5)
-    assert on_arrays_C_A_B == pytest.approx(covariance.between(*inputs).numpy(), rel=1e-12)
+    covariance, inputs = learned.learned(), (A.double().numpy(), B.double().numpy())
+    assert covariance.between(*inputs) == pytest.approx(learned(A, B).detach().numpy(), abs=1e-5)
     assert covariance.scale_C == pytest.approx(unlike(name).scale_C, rel=1e-6)
     assert covariance.parameter_C == pytest.approx(unlike(name).parameter_C, rel=1e-6)
 
@@ -57,10 +55,9 @@ def test_the_variance_is_the_covariances_diagonal(name, n):
 
 @pytest.mark.parametrize("name", COVARIANCES)
 def test_gradients_stay_finite_where_inputs_coincide(name):
-    for form, precision in ((LearnedCovariance(unlike(name)), A.dtype), (unlike(name).between, torch.float64)):
-        inputs = A[[0, 0, 1]].to(precision, copy=True).requires_grad_()
-        form(inputs, inputs).sum().backward()
-        assert torch.isfinite(inputs.grad).all()
+    inputs = A[[0, 0, 1]].clone().requires_grad_()
+    LearnedCovariance(unlike(name))(inputs, inputs).sum().backward()
+    assert torch.isfinite(inputs.grad).all()
 
 
 def test_the_polynomial_is_that_of_inputs_divided_by_the_root_of_their_number():

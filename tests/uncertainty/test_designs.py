@@ -6,7 +6,7 @@ import pytest
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.rigid import transform
 from gpca.uncertainty import designs
-from gpca.uncertainty.interventions import MIDDLE, UNTOUCHED, UPPER, Knobs, PairDraws
+from gpca.uncertainty.interventions import MIDDLE, UNTOUCHED, UPPER, PairDraws
 from gpca.uncertainty.settings import CONDITIONS, CORNERS, LATIN, SALTELLI, UncertaintySettings
 
 SETTINGS = UncertaintySettings(starts=13, icp_points=60)
@@ -181,17 +181,3 @@ def test_sampled_knobs_lie_within_the_ranges(kind, settings):
     assert (np.ptp(sampled, axis=0) > 0.8 * designs.KNOB_RANGE).all()
     designs.sample_knobs.cache_clear()
     assert np.array_equal(designs.sample_knobs(kind), sampled)
-
-
-@pytest.mark.parametrize("row", range(3))
-def test_live_uncertainty_has_the_values_of_the_table_in_any_order_and_keeps_nothing(registrations, row):
-    tests = registrations.subset(registrations.rows("test")[:3])
-    outcomes, *_ = designs.evaluate_design("additive", tests, "tiny", 0, SETTINGS)
-    live = designs.LiveUncertainty(tests, row, "tiny", 0, SETTINGS)
-    assert live.icp_calls == 13  # the clean run
-    values = [live(knobs) for knobs in reversed(designs.ADDITIVE_KNOBS)]
-    assert values[::-1] == pytest.approx(outcomes.uncertainty[row], abs=1e-9)
-    assert np.ptp(values) > 0
-    assert live(UNTOUCHED) == 0
-    assert live(Knobs(0.02, 2.0, 0.2)) == live(Knobs(0.02, 2.0, 0.2))
-    assert live.icp_calls == 13 * (1 + len(designs.ADDITIVE_KNOBS) + 3)

@@ -4,14 +4,12 @@ from scipy.optimize import linprog
 from scipy.spatial import cKDTree
 
 from gpca.alignment.batched_icp import BatchedICP
-from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Severities
 from gpca.rigid import exp
 from gpca.uncertainty import interventions
 from gpca.uncertainty.interventions import (
     FEWEST_TRIMMED,
     MIDDLE,
-    MOST,
     RESTARTS,
     UNTOUCHED,
     UPPER,
@@ -77,20 +75,8 @@ def test_a_setting_does_not_depend_on_those_before_it():
     assert len({numbers(each) for each in forth}) == len(settings)
 
 
-@pytest.mark.parametrize("value", [-1e-9, -1.0, np.nan, np.inf])
-@pytest.mark.parametrize("name", Knobs._fields)
-def test_a_knob_outside_its_range_is_named(calls, name, value):
-    with pytest.raises(InputError, match=rf"knob '{name}': {value} is outside \[0, ") as caught:
-        knob_runs()(UNTOUCHED._replace(**{name: value}))
-    assert "\n" not in str(caught.value) and not calls
-
-
-def test_the_ends_of_the_ranges_belong_to_them():
+def test_starts_without_a_spread_are_one_pose():
     runs = knob_runs()
-    for name in Knobs._fields:
-        assert np.isfinite(runs(UNTOUCHED._replace(**{name: getattr(MOST, name)})).residual)
-        with pytest.raises(InputError, match=f"knob '{name}'"):
-            runs(UNTOUCHED._replace(**{name: getattr(MOST, name) * 1.001}))
     still = runs(Knobs(0.0, 0.0, 0.0))  # no spread of the starts: one pose in all runs
     assert still.degenerate and np.allclose(still.covariance, 0, atol=1e-12) and np.isfinite(still.residual)
 
@@ -103,7 +89,7 @@ def test_middle_and_upper_ends_are_those_of_the_severities():
     assert [rotation_over_starts[1], translation_over_starts[1]] == pytest.approx([UPPER.spread] * 2)
     assert (MIDDLE.noise, MIDDLE.overlap) == pytest.approx((np.mean(ranges.noise), np.mean(ranges.crop)))
     assert MIDDLE.spread == pytest.approx(rotation_over_starts.mean())
-    assert (np.diff([(0, 1, 0), MIDDLE, UPPER, MOST], axis=0) > 0).all()
+    assert (np.diff([(0, 1, 0), MIDDLE, UPPER], axis=0) > 0).all()
 
 
 def test_spread_scales_the_starts_and_noise_is_the_same_jitter_times_its_deviation(calls):
@@ -141,7 +127,7 @@ def test_overlap_cuts_off_that_share_beyond_a_plane_and_more_of_the_same_side_wh
         assert linprog(np.zeros(4), A_ub=sides, b_ub=-np.ones(len(SOURCE)), bounds=(None, None)).status == 0
     assert set(kept[2]) < set(kept[1]) < set(kept[0])
     for points in (3, 4, 20):
-        result = knob_runs(SOURCE[:points])(Knobs(overlap=MOST.overlap))
+        result = knob_runs(SOURCE[:points])(Knobs(overlap=0.95))
         assert len(calls[-1][0]) == 3
         assert np.isfinite(result.covariance).all() and np.isfinite(result.residual)
 
