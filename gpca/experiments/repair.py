@@ -26,12 +26,13 @@ from gpca.reporting.sheet import Row, Sheet, Show, crossed, show
 from gpca.seeds import seed_of_file
 from gpca.settings import Distinct
 from gpca.steps.repair import LIKELIEST, MANY_STARTS, REPAIR, STARTS, Asked
-from gpca.steps.repair_verdicts import CAUSES, COLUMNS, HARD, JUDGED, SCORE
+from gpca.steps.repair_verdicts import CAUSES, COLUMNS, HARD, JUDGED, NAMED, SCORE
 
 NAME = "repair"
 FRAMES, SCANS = "frames", "scans"
 TRACKS = {CAUSES: "Causes", HARD: "Hard", FRAMES: "Depth frames", SCANS: "Scans"}
 POINTS = {"few": (0, 256), "some": (256, 512), "many": (512, inf)}  # of the smaller cloud: above, and at most
+THIRDS = ("near", "middle", "far")  # of the failed registrations, by the error of their start
 RIVAL = "rival"
 COMPARED = ("repaired", "hindsight", "right_pose")  # measures of which there are differences from the best rival
 OF_REPAIR = ("several", "called", "false_alarms")  # the same for all methods, or of repair alone
@@ -141,20 +142,23 @@ DECIDE = Step(
 
 
 def read_verdicts(path: str | Path) -> Frame:
-    names = ("track", "source", "seed", "sample", "group", "cluster", "label", "points", "method")
-    rows = read_csv(path, (*names, *COLUMNS, SCORE), others=ANY)
-    numeric = {name: number_column(path, rows, name) for name in ("seed", "sample", "points", SCORE)}
+    rows = read_csv(path, (*NAMED, *COLUMNS, SCORE), others=ANY)
+    numeric = {name: number_column(path, rows, name) for name in ("seed", "sample", "points", "start_error", SCORE)}
     return rows.assign(**numeric, **{name: rows[name].astype(str) == "True" for name in COLUMNS})
 
 
 def parts_of(rows: Frame) -> Iterator[tuple[str, np.ndarray]]:
-    """Parts of registrations: all, by dominant cause, number of points, source and kind of start."""
+    """Parts of registrations: all, by dominant cause, number of points, error of the start, source and its kind."""
     yield ALL, np.ones(len(rows), bool)
     yield from ((concept, (rows["label"] == concept).to_numpy()) for concept in CONCEPTS)
     yield from (
         (name, ((rows["points"] > least) & (rows["points"] <= most)).to_numpy())
         for name, (least, most) in POINTS.items()
     )
+    if rows["failed"].any():
+        edges = np.quantile(rows["start_error"][rows["failed"]], [1 / 3, 2 / 3])
+        third_N = np.searchsorted(edges, rows["start_error"])
+        yield from ((name, third_N == third) for third, name in enumerate(THIRDS))
     for column in ("source", "group"):
         values = rows[column].unique()
         yield from ((value, (rows[column] == value).to_numpy()) for value in values if len(values) > 1)
@@ -306,18 +310,26 @@ def table20_repair(run: Run, intervals, seconds):
     )
 
 
+def part_titles(run: Run) -> dict[str, str]:
+    """Titles of the parts that tables show."""
+    points = {"few": "Up to 256 points", "some": "Up to 512", "many": "More"}
+    starts = {"near": "Start near", "middle": "Middle", "far": "Far"}
+    return {name: name.capitalize() for name in CONCEPTS} | points | starts | run.source_titles
+
+
+PARTS_NOTE = "Near, middle and far: thirds of the failed registrations, by the error of their start."
+
+
 @table(
     SECTION,
-    "Table XX by cause, points and source",
-    """Repaired shares of the failed registrations of the track of causes, by their dominant cause, by the number of
-    points of the smaller cloud, and by source.""",
+    "Table XX by cause, points, start and source",
+    """Repaired shares of the failed registrations of the track of causes, by their dominant cause, the number of
+    points of the smaller cloud, the error of the start, and source.""",
     intervals="repair.csv",
 )
 def table20_parts(run: Run, intervals):
-    titles = titles_of(run.config, judged=False)
+    titles, parts = titles_of(run.config, judged=False), part_titles(run)
     rows = [Row([method], {"source": CAUSES, "method": method[0]}) for method in titles.items()]
-    words = {"few": "Up to 256 points", "some": "Up to 512", "many": "More"}
-    parts = {name: name.capitalize() for name in CONCEPTS} | words | run.source_titles
     columns: dict[str, Show] = {
         part: show("repaired", f"{title} (%)", part, decimals=0) for part, title in parts.items()
     }
@@ -328,7 +340,26 @@ def table20_parts(run: Run, intervals):
         "part",
         (
             f"{sheet.over()}. Failed: {', '.join(f'{title} {count}' for title, count in failed.items())}.",
-            "Rivals are accepted by their best tests, as in Table XX.",
+            f"Rivals are accepted by their best tests, as in Table XX. {PARTS_NOTE}",
         ),
         bold=columns,
     )
+
+
+@table(
+    SECTION,
+    "Table XX, lead by part",
+    """By how much repair is ahead of the rival that repairs most of a part, both with the best limit in hindsight.""",
+    intervals="repair.csv",
+)
+def table20_lead(run: Run, intervals):
+    of = {"source": CAUSES, "method": REPAIR}
+    rows = [Row([part], of | {"concept": part[0]}) for part in ({ALL: "All"} | part_titles(run)).items()]
+    columns = {
+        name: replace(column, where={key: value for key, value in column.where.items() if key != "concept"})
+        for name, column in SHOWN.items()
+        if name in ("repaired", "right_pose", "hindsight", "lead")
+    }
+    sheet = Sheet("table20_lead", {"part": "Failed registrations"}, rows, columns, intervals)
+    notes = (f"{sheet.over()}. {PARTS_NOTE} The best rival is picked for each part.",)
+    return sheet.table("Lead of repair over the best rival, by part" + run.stand_ins(), "metric", notes)

@@ -89,6 +89,7 @@ class Attempts(Container):
     cluster_N: np.ndarray = array("N", TEXT)  # that the bootstrap draws
     label_N: np.ndarray = array("N", TEXT)  # dominant cause of a failure by its mean error; ``none`` of any other
     points_N: np.ndarray = array("N", WHOLE)  # of the smaller cloud
+    start_error_N: np.ndarray = array("N", least=0)  # of the initial pose, as errors of poses are
     error_N_C: np.ndarray = array("N C", least=0)
     weight_N_C: np.ndarray = array("N C", least=0, most=1)
     distance_N_C_K: np.ndarray = array("N C K", least=0)
@@ -217,7 +218,7 @@ def try_all(
     import pandas as pd
 
     methods, functions = {name: make_method(name, entry) for name, entry in settings.methods.items()}, functions or {}
-    proposals, errors, columns, seconds = [], [], [], []
+    proposals, errors, start_errors, columns, seconds = [], [], [], [], []
     registrations = causes.registrations
     for row in progress(range(len(causes)), f"repairs of {axes[0]}, seed {axes[1]}"):
         pair = observed_pair(causes, row, *axes, "reenactment")
@@ -226,6 +227,7 @@ def try_all(
         surface = ModelSurface(pair.model)
         proposals.append(propose_for(pair, T_K, weight_K, icp, moved, surface))
         errors.append(world.errors(row, proposals[-1].T_n))
+        start_errors.append(world.errors(row, np.eye(4)[None])[0])
         rival = Rivals(pair, surface, icp, settings.points, proposals[-1], perf_counter() - started)
         tried = [*rival.built_in(), *(rival.by(name, method, warm=row == 0) for name, method in methods.items())]
         tried += [rival.by_function(name, function) for name, function in functions.items()]
@@ -241,6 +243,7 @@ def try_all(
     error_N_M, *judged_N_M, rmse_N_M, fitness_N_M, score_N_M_Q = map(np.array, zip(*columns, strict=True))
     attempts = Attempts(
         **world.columns,
+        start_error_N=np.array(start_errors),
         error_N_C=np.hstack([proposed.error_N_P, error_N_M]),
         weight_N_C=np.hstack([proposed.weight_N_P, np.zeros_like(error_N_M)]),
         distance_N_C_K=np.hstack([proposed.distance_N_P_K, judged_N_M[0]]),

@@ -21,6 +21,7 @@ from gpca.steps.repair import REPAIR, TESTS, Attempts
 CAUSES, HARD = "causes", "hard"  # tracks whose families judges and limits come from; and that share these
 JUDGED = "judged"  # after a rival's name: its pose is accepted by the judge
 FALSE_ALARMS = 0.05  # share of the good registrations of other families that are called failed
+NAMED = ("track", "source", "seed", "sample", "group", "cluster", "label", "points", "start_error", "method")
 COLUMNS = ("failed", "called", "replaced", "right", "right_pose", "several")
 SCORE = "score"  # by which a pose is accepted; the smaller, the surer
 
@@ -56,9 +57,9 @@ def verdicts(attempts: Mapping[str, Sequence[tuple[str, int, Attempts]]], tolera
                 limits = limits_of.get(family, every) if track in (CAUSES, HARD) else every
                 for method, outcome in decided(each, row, limits, tolerance):
                     named = (track, source, seed, each.sample_N[row], each.group_N[row], each.cluster_N[row])
-                    frames.append((*named, each.label_N[row], each.points_N[row], method, *outcome))
-    names = ("track", "source", "seed", "sample", "group", "cluster", "label", "points", "method", *COLUMNS, SCORE)
-    return pd.DataFrame(frames, columns=list(names))
+                    described = each.label_N[row], each.points_N[row], each.start_error_N[row], method
+                    frames.append((*named, *described, *outcome))
+    return pd.DataFrame(frames, columns=[*NAMED, *COLUMNS, SCORE])
 
 
 def learn_limits(learned: Attempts, tolerance: float) -> Limits:

@@ -8,7 +8,16 @@ import pytest
 
 from gpca.alignment.icp import ICPSettings
 from gpca.errors import InputError
-from gpca.experiments.repair import RIVAL, collect, mean_seconds, measured, table20_parts, table20_repair
+from gpca.experiments.repair import (
+    RIVAL,
+    THIRDS,
+    collect,
+    mean_seconds,
+    measured,
+    table20_lead,
+    table20_parts,
+    table20_repair,
+)
 from gpca.io.csv_file import write_csv
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.steps.repair import LIKELIEST, NEVER, REPAIR, TESTS, Attempts, RepairSettings, World, searched, try_all
@@ -77,6 +86,7 @@ def drawn(seed, families=14, each=24):
         cluster_N=np.repeat([f"family {number}" for number in range(families)], each),
         label_N=np.full(count, "pose"),
         points_N=np.full(count, 300),
+        start_error_N=random.random(count),
         error_N_C=error_N_C,
         weight_N_C=np.tile([0, 0.7, 0.3, 0, 0], (count, 1)),
         distance_N_C_K=distance_N_C_K,
@@ -119,7 +129,11 @@ def test_the_tables_show_every_track_and_part(tmp_path):
     run = run_with()
     numbers = collect(run, tmp_path / "verdicts.csv")
     seconds = mean_seconds(pd.DataFrame({"method": [REPAIR, "fgr"], "seconds": [0.05, 0.1], "seed": 0}))
-    whole, parts = table20_repair(run, numbers, seconds), table20_parts(run, numbers)
+    whole, parts, lead = table20_repair(run, numbers, seconds), table20_parts(run, numbers), table20_lead(run, numbers)
     assert whole.printed()["rows"][0][0][0] == "Causes" and len(whole.rows) == 5
-    assert {"pose", "some"} <= set(parts.columns) and "few" not in parts.columns
+    assert {"pose", "some", "near", "far"} <= set(parts.columns) and "few" not in parts.columns
+    thirds = [row for row, labels in enumerate(lead.rows) if labels[0][0] in THIRDS]
+    n_thirds = [lead.cells[row, "lead"].test_samples for row in thirds]
+    assert len(thirds) == 3 and max(n_thirds) - min(n_thirds) <= 1
+    assert sum(n_thirds) == lead.cells[0, "lead"].test_samples
     assert whole.cells[0, "lead"].mean > 0 and whole.cells[0, "ms"].mean == pytest.approx(50)
