@@ -165,7 +165,10 @@ def read_submissions(folder: Path) -> tuple[dict[str, list[Submission]], list[st
         submission, faults_of_file = read_submission(path, published[track])
         faults += faults_of_file
         if submission is not None:
-            submissions.setdefault(track, []).append(submission)
+            rivals = submissions.setdefault(track, [])
+            if submission.method.name in [other.method.name for other in rivals]:
+                faults.append(f"{path}: its method has the name of another one; give it a name of its own")
+            rivals.append(submission)
     return submissions, faults
 
 
@@ -176,37 +179,38 @@ def boards(submissions: Mapping[str, Sequence[Submission]]) -> list[dict[str, An
         for name, track in TRACKS.items()
         if (PUBLISHED / f"{name}.npz").is_file()
     ]
-    together = overall([(of, {each.method.name: each.method for each in sent}) for of, sent in tracks])
-    return [together, *(board_of(*track) for track in tracks)]
+    links = {each.method.name: each.head["link"] for _, sent in tracks for each in sent if each.head["link"] != NO_LINK}
+    methods = [(of, {each.method.name: each.method for each in sent}) for of, sent in tracks]
+    together, costs = overall(methods, links)
+    return [
+        together,
+        *(board_of(*track, links) | {"costs": points} for track, points in zip(tracks, costs, strict=True)),
+    ]
 
 
-def board_of(published: Published, submissions: Sequence[Submission]) -> dict[str, Any]:
+def board_of(published: Published, submissions: Sequence[Submission], links: Mapping[str, str]) -> dict[str, Any]:
     """Return the table of a track with submissions among the published rows, as the page shows it.
 
-    Its first ``labels`` columns are text, the others are sorted as numbers. A row says whether it is submitted, and has
-    cells {text, value, link, bold}.
+    Its groups have rows of cells {text, bold, link}, of which the first ``labels`` are words.
     """
     head_of = {submission.method.name: submission.head for submission in submissions}
     submitted = {submission.method.name: submission.method for submission in submissions}
     scores, _ = score(published, submitted)
     table = table_of(published, submitted, scores, scores.iloc[:0])
     printed = table.printed()
-    labels, rows = printed["label_columns"], []
-    columns = [name for name, column in table.columns.items() if not column.beside]
-    for row, (keys, cells) in enumerate(zip(table.rows, printed["rows"], strict=True)):
+    has_groups = bool(published.track.groups)
+    groups: dict[str, list[dict[str, Any]]] = {}
+    for keys, cells in zip(table.rows, printed["rows"], strict=True):
         name = keys[-2][0]
         head = head_of.get(name, OURS)
-        shown: list[dict[str, Any]] = [{"text": text, "value": text, "bold": bold} for text, bold in cells]
-        for column, cell in zip(columns, shown[labels:], strict=True):
-            cell["value"] = table.cells[row, column].mean if (row, column) in table.cells else ""
-        if (link := head.get("link", NO_LINK)) != NO_LINK:
-            shown[labels - 2]["link"] = link
-        shown += [{"text": head.get(key, "–"), "bold": False, "value": head.get(key, "")} for key in HEAD_COLUMNS]
-        rows.append((name in head_of, shown))
+        shown: list[dict[str, Any]] = [{"text": text, "bold": bold} for text, bold in cells[has_groups:]]
+        shown[0] |= {"link": links[name]} if name in links else {}
+        shown += [{"text": head.get(key, "–"), "bold": False} for key in HEAD_COLUMNS]
+        groups.setdefault(cells[0][0] if has_groups else "", []).append({"submitted": name in head_of, "cells": shown})
     return {
         "title": f"{published.track.name}: {published.track.title}",
-        "heads": [*printed["heads"], *(key.capitalize() for key in HEAD_COLUMNS)],
-        "labels": labels,
-        "rows": rows,
+        "heads": [*printed["heads"][has_groups:], *(key.capitalize() for key in HEAD_COLUMNS)],
+        "labels": 2,
+        "groups": groups,
         "notes": [f"Samples {published.version}.", *table.footnotes],
     }

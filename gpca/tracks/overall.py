@@ -13,9 +13,11 @@ import numpy as np
 from gpca.evaluation.intervals import interval
 from gpca.evaluation.measures import POOLED
 from gpca.experiments.frame_causes import FEWEST_FAILURES
-from gpca.tracks.published import Method, Published
+from gpca.tracks.published import NO_CALLS, Method, Published
 from gpca.tracks.scoring import AREA, counts, groups_of, measured_of
 
+WORST = 0.5  # AUGRC of who is always wrong
+MOST_CALLS = 1000  # at the end of the axis of costs
 NOTES = (
     "AUGRC: the mean over all thresholds of a method's confidence of the share of samples that it answers wrongly "
     "above it, in %; a cause counts that adds as much as the dominant one. Of depth frames, the mean over the kinds of "
@@ -51,30 +53,62 @@ def ranks(mean_of: Mapping[str, np.ndarray]) -> dict[str, int]:
     return ranked
 
 
-def overall(tracks: Sequence[tuple[Published, Mapping[str, Method]]]) -> dict[str, Any]:
-    """Return the board of all tracks, as :func:`gpca.tracks.leaderboard.board_of` returns one of each."""
+def overall(
+    tracks: Sequence[tuple[Published, Mapping[str, Method]]], links: Mapping[str, str]
+) -> tuple[dict[str, Any], list[list[dict[str, Any]]]]:
+    """Return the board of all tracks (:func:`gpca.tracks.leaderboard.board_of`), and :func:`costs_of` on each track."""
     track_areas = {published.track.name: areas(published, submitted) for published, submitted in tracks}
-    titles = {
-        method.name: (method.title, method.name in submitted)
-        for published, submitted in tracks
-        for method in (*published.methods, *submitted.values())
-    }
-    everywhere = [name for name in titles if all(name in values for values in track_areas.values())]
+    methods: dict[str, Method] = {}
+    calls_of: list[dict[str, int]] = []
+    for published, sent in tracks:
+        named = {method.name: method for method in (*published.methods, *sent.values())}
+        methods = named | methods
+        calls_of.append({name: method.icp_calls for name, method in named.items()})
+    everywhere = [name for name in methods if all(name in values for values in track_areas.values())]
     means = {name: np.mean([values[name] for values in track_areas.values()], axis=0) for name in everywhere}
-    ranked = ranks(means)
-    rows = []
-    for name in sorted(titles, key=lambda name: means[name][0] if name in means else np.inf):
-        title, is_submitted = titles[name]
-        cells: list[dict[str, Any]] = [{"text": title, "value": title}]
-        cells.append({"text": str(ranked.get(name, "–")), "value": ranked.get(name, "")})
-        for values in (means, *track_areas.values()):
-            cells.append(_cell(values[name]) if name in values else {"text": "–", "value": ""})
-        if any(name in values for values in track_areas.values()):
-            rows.append((is_submitted, [cell | {"bold": ranked.get(name) == 1} for cell in cells]))
-    heads = ["Method", "Rank", "Mean AUGRC (%)", *(f"{name} (%)" for name in track_areas)]
-    return {"title": "All tracks", "heads": heads, "labels": 1, "rows": rows, "notes": list(NOTES)}
+    most_calls = {name: max(calls.get(name, NO_CALLS) for calls in calls_of) for name in methods}
+    ranked, rows = ranks(means), []
+
+    def place(name: str) -> tuple[int, float]:
+        risks = [values[name][0] for values in track_areas.values() if name in values]
+        return -len(risks), float(np.mean(risks))
+
+    for name in sorted((name for name in methods if any(name in of for of in track_areas.values())), key=place):
+        calls = most_calls[name]
+        cells: list[dict[str, Any]] = [{"text": methods[name].title} | ({"link": links[name]} if name in links else {})]
+        cells.append({"text": str(ranked.get(name, "–"))})
+        cells += [_cell(values.get(name)) for values in (means, *track_areas.values())]
+        cells.append({"text": "–" if calls == NO_CALLS else str(calls)})
+        submitted = any(name in of for _, of in tracks)
+        rows.append({"submitted": submitted, "cells": [cell | {"bold": ranked.get(name) == 1} for cell in cells]})
+    heads = ["Method", "Rank", "Mean AUGRC (%)", *(f"{name} (%)" for name in track_areas), "ICP runs"]
+    board = {"title": "All tracks", "heads": heads, "labels": 1, "groups": {"": rows}, "notes": NOTES}
+    costs = [costs_of(*each, methods) for each in zip(track_areas.values(), calls_of, strict=True)]
+    return board | {"costs": costs_of(means, most_calls, methods)}, costs
 
 
-def _cell(value_B: np.ndarray) -> dict[str, Any]:
-    value, low, high = (100 * each for each in interval(value_B))
-    return {"text": f"{value:.1f} ({low:.1f} to {high:.1f})", "value": value}
+def costs_of(
+    area_of: Mapping[str, np.ndarray], calls_of: Mapping[str, int], methods: Mapping[str, Method]
+) -> list[dict[str, Any]]:
+    """Return a point for each method with known ICP runs, the cheapest first: its place, as a share of both axes.
+
+    ``best`` are those that no method with as few runs surpasses.
+    """
+    points: list[dict[str, Any]] = []
+    counted = [name for name in area_of if calls_of[name] != NO_CALLS]
+    for name in sorted(counted, key=lambda name: (calls_of[name], area_of[name][0])):
+        cell, calls = _cell(area_of[name]), calls_of[name]
+        is_best = all(cell["drawn"][1] < point["drawn"][1] for point in points)
+        across = min(1.0, np.log1p(calls) / np.log1p(MOST_CALLS))
+        words = f"{methods[name].title}: {cell['text']} %, {calls} runs of ICP"
+        points.append({"words": words, "across": across, "drawn": cell["drawn"], "best": is_best})
+    return points
+
+
+def _cell(value_B: np.ndarray | None) -> dict[str, Any]:
+    if value_B is None:
+        return {"text": "–"}
+    estimate = interval(value_B)
+    value, low, high = (100 * each for each in estimate)
+    drawn = [round(each / WORST, 4) for each in (estimate.low, estimate.value, estimate.high)]
+    return {"text": f"{value:.1f} ({low:.1f} to {high:.1f})", "drawn": drawn}

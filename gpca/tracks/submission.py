@@ -99,7 +99,7 @@ def read_submission(path: Path, published: Published) -> tuple[Submission | None
     if faults or predictions is None:
         return None, faults
     calls = int(head["icp_calls"]) if head.get("icp_calls") else NO_CALLS
-    name = f"{path.stem} (submitted)"  # differs from the published ones
+    name = f"{head['method']} (submitted)"  # differs from the published ones, and is the same on all tracks
     return Submission(head, Method(name, head["method"], head.get("reads", ""), calls, *predictions)), faults
 
 

@@ -12,6 +12,7 @@ from gpca.causes.truth import ALL, BY_SIZE
 from gpca.model.scene import MOST_POINTS, packed, taken_out
 from gpca.rigid import rigid_motion, transform
 
+from ..accessible import faults_of
 from ..page.test_in_a_browser import chromium, in_a_browser, with_script
 
 LARGEST_BYTES = 2 * 10**6
@@ -43,6 +44,7 @@ def test_a_page_is_one_small_file_that_asks_for_no_other(html):
     assert re.findall(r'href="([^"]*)"', html) == ["data:,"]
     assert "default-src 'none'" in html
     assert "scan &lt;1&gt;.ply" in html
+    assert faults_of(html) == []
 
 
 def test_a_notebook_shows_the_page_in_a_frame(explained):

@@ -10,6 +10,7 @@ from gpca.errors import InputError
 from gpca.io.files import whole_file
 from gpca.page.page import Links, in_groups, read_provenance, write_page
 from gpca.process.processor import describe
+from tests.accessible import faults_of
 from tests.page.small_run import FIGURES, TABLES, Page, results, run_of
 from tests.page.test_comparison import HEAD, LINES
 
@@ -23,6 +24,12 @@ def test_every_link_leads_to_a_file_or_a_place_on_the_page(page, folder):
     assert [source for source in page.sources if not (folder / source).is_file()] == []
     assert len(set(page.ids)) == len(page.ids)
     assert re.findall(r"(?:https?:)?//[\w-]+\.[\w.-]+", page.text) == []  # nothing is loaded from elsewhere
+
+
+def test_the_page_can_be_read_by_ear_and_by_keyboard(page):
+    assert faults_of(page.text) == []
+    broken = page.text.replace('<html lang="en">', "<html>").replace('scope="col"', "", 1).replace("<h3>", "<h4>", 1)
+    assert len(faults_of(broken)) >= 3
 
 
 def test_every_table_and_figure_is_shown_with_its_caption_in_the_papers_order(page):

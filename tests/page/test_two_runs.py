@@ -11,6 +11,7 @@ from gpca.comparison.verdicts import COMPARISON_COLUMNS
 from gpca.errors import InputError
 from gpca.page.two_runs import compare_tables, read_number, read_printed_table
 from gpca.reporting.tables.table import Cell, Column, Table
+from tests.accessible import faults_of
 from tests.page.small_run import Page
 
 
@@ -75,6 +76,7 @@ def test_the_page_and_the_lines_say_how_much_differs(two_runs, tmp_path, capsys,
         "compare.html",
     ]
     page = Page((tmp_path / "compare.html").read_text())
+    assert faults_of(page.text) == []
     assert page.stack == []
     assert len(set(page.ids)) == len(page.ids)
     assert [link for link in page.links if link.startswith("#") and link[1:] not in page.ids] == []

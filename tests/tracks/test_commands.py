@@ -13,6 +13,7 @@ from gpca.process import plugins
 from gpca.tracks import leaderboard
 from gpca.tracks.leaderboard import MARK
 
+from ..accessible import faults_of
 from .conftest import SOURCE
 
 
@@ -137,13 +138,17 @@ def test_the_page_ranks_submissions_and_can_be_sorted(board, capsys):
     assert '<a href="https://github.com/me/rmse" rel="nofollow">' in page
     assert "&lt;b&gt;Me&lt;/b&gt;" in page and "<b>Me" not in page
     assert "http" not in page.replace("https://github.com/me/rmse", "")  # nothing is fetched
-    tables, heads = (
-        re.findall(r"<tbody>(.*?)</tbody>", page, re.DOTALL),
-        re.findall(r"<thead>.*?</thead>", page, re.DOTALL),
-    )
+    assert faults_of(page) == []
+    tables, heads = (re.findall(f"<{tag}>(.*?)</{tag}>", page, re.DOTALL) for tag in ("tbody", "thead"))
     for table, head, count in zip(tables, heads, (3, 4), strict=True):  # the ceiling has no rank
         rows = re.findall(r"<tr.*?</tr>", table, re.DOTALL)
-        assert {row.count("<td") for row in rows} == {head.count("<th ")} and len(rows) == count
+        assert {len(re.findall("<t[dh]", row)) for row in rows} == {head.count("<th ")} and len(rows) == count
+
+
+def test_a_name_stands_on_a_track_once(board, capsys):
+    (board / "again.csv").write_text((board / "rmse.csv").read_text())
+    assert main(["leaderboard", "--submissions", str(board), "--check"]) == 2
+    assert "rmse.csv: its method has the name of another one; give it a name of its own" in capsys.readouterr().err
 
 
 def test_the_submissions_of_the_repository_are_without_fault():

@@ -11,7 +11,7 @@ from gpca.evaluation.measures import POOLED
 from gpca.experiments.diagnosis import collect
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.tracks.leaderboard import MARK, as_text, table_of
-from gpca.tracks.overall import areas, overall, ranks
+from gpca.tracks.overall import areas, costs_of, overall, ranks
 from gpca.tracks.published import Method, Rows
 from gpca.tracks.scoring import groups_of, score
 from gpca.tracks.track import TRACKS
@@ -122,6 +122,18 @@ def test_the_score_of_all_tracks_is_the_risk_of_answers_that_are_not_held_back(s
     found = areas(shipped, {})
     knows, guesses = found["rule"][0], found["chance"][0]
     assert knows == 0 < guesses < 0.5  # a wrong answer to every sample is held back half of the time
-    board = overall([(shipped, {})])
-    assert [cells[0]["text"] for _, cells in board["rows"]] == [method.title for method in shipped.methods[::-1]]
-    assert board["rows"][0][1][1]["text"] == "1"
+    board, [costs] = overall([(shipped, {})], {"rule": "https://rule.org"})
+    rows = [row["cells"] for row in board["groups"][""]]
+    assert [cells[0]["text"] for cells in rows] == [method.title for method in shipped.methods[::-1]]
+    assert [cells[0].get("link") for cells in rows] == ["https://rule.org", None]
+    assert rows[0][1]["text"] == "1" and rows[0][2]["drawn"][1] == 0
+    # The rule asks for 12 runs of ICP, and chance for none.
+    assert [(point["across"], point["best"]) for point in costs] == [(0, True), (pytest.approx(0.371, abs=1e-3), True)]
+    assert [
+        point["best"]
+        for point in costs_of(
+            found | {"rule": found["chance"] + 0.1},
+            {"rule": 12, "chance": 0},
+            {each.name: each for each in shipped.methods},
+        )
+    ] == [True, False]

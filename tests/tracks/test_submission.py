@@ -28,7 +28,7 @@ def test_a_file_is_read_as_it_was_written(written, head, shipped):
     read, faults = read_submission(written, shipped)
     assert faults == []
     assert read.head == head
-    assert (read.method.name, read.method.title) == ("mine (submitted)", "My method")
+    assert (read.method.name, read.method.title) == ("My method (submitted)", "My method")
     assert (read.method.reads, read.method.icp_calls) == ("pair", 3)
     np.testing.assert_allclose(read.method.scores, shipped.methods[1].scores)
     assert read.method.named.tolist() == [2, -1, *[2] * (len(shipped.rows) - 2)]
