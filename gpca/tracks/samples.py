@@ -10,7 +10,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
@@ -25,6 +25,7 @@ from gpca.frames.source import REAL_WORLD
 from gpca.jobs.provenance import RECORD
 from gpca.process.code_files import ROOT
 from gpca.process.plugins import named
+from gpca.process.progress import progress
 from gpca.steps.control_samples import HARD, HARD_REENACTMENTS
 from gpca.tracks.published import Published, require_clone, sha256_of_arrays
 from gpca.tracks.track import DEFAULT, Track
@@ -135,11 +136,18 @@ def make(files: Iterable[str], folder: Path, config: Mapping[str, Any], processe
         if first not in steps:
             steps[first] = recipe
             open_files += recipe.inputs.values()
+    for _ in progress(_made(steps, folder, processes), "making samples", total=len(steps)):
+        pass
+
+
+def _made(steps: dict[str, Recipe], folder: Path, processes: int) -> Iterator[str]:
+    """Run all steps, whose inputs come first, and yield the name of each."""
     while steps:
         waiting = {output for recipe in steps.values() for output in recipe.outputs.values()}
         ready = [name for name, recipe in steps.items() if not waiting & set(recipe.inputs.values())]
         with ThreadPoolExecutor(processes) as pool:
-            list(pool.map(lambda name: _run(steps[name], folder), ready))
+            for name, _ in zip(ready, pool.map(lambda name: _run(steps[name], folder), ready), strict=True):
+                yield name
         for name in ready:
             del steps[name]
 

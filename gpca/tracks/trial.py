@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
@@ -22,6 +25,7 @@ from gpca.explainers.registry import explainer_entry, make_rivals, require_setti
 from gpca.frames.source import REAL_WORLD
 from gpca.jobs.job import Job
 from gpca.pairs.dataset import Registrations, read_embedding
+from gpca.process.progress import progress
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import read_settings
 from gpca.steps.control_samples import HARD, HARD_REENACTMENTS, ControlSettings
@@ -31,9 +35,12 @@ from gpca.steps.learning_curve import CurveSettings
 from gpca.steps.scan_causes import diagnose as diagnose_scans
 from gpca.tracks.published import NOTHING_NAMED, Method, label_numbers, predicted
 from gpca.tracks.samples import TrackSamples
-from gpca.tracks.track import CAUSES_TRACK, FRAMES_TRACK, HARD_TRACK, SCANS_TRACK
+from gpca.tracks.track import CAUSES_TRACK, FRAMES_TRACK, HARD_TRACK, SCANS_TRACK, TRACKS
 from gpca.uncertainty.settings import UncertaintySettings
 
+# Changes of the samples on which a method is tried before all are made: enough of each label, at little cost.
+TEN = 10
+FEW = {"train": 30, "test": TEN, "several": [0, 1], "clean_pairs": 20, "candidates": 200, "points": [128, 256]}
 # By an explainer's reads.
 FOLDERS = {REENACTED: "reenactments", EMBEDDINGS: "cause_embeddings", DESCRIBED: "descriptors"}
 
@@ -66,6 +73,41 @@ class MethodTrial(NamedTuple):
     training: str
 
 
+@dataclass(frozen=True)
+class FewSamples(TrackSamples):
+    """Forty small samples of one source, ten of them to be answered, which no published row is of."""
+
+    whole: Mapping[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def config(self) -> dict[str, Any]:
+        """The config of the track's run with `FEW` samples, which need not be matched."""
+        hard = {key: value for key, value in self.whole["controls"]["hard"].items() if key != "matched"}
+        controls = {**self.whole["controls"], "hard": hard | FEW}
+        return {**self.whole, "causes": {**self.whole["causes"], **FEW}, "controls": controls}
+
+    def parts(self) -> list[tuple[str, int, np.ndarray]]:
+        """Return the last source, which is large, and the first seed."""
+        return [(list(self.whole["sources"])[-1], self.whole["seeds"][0], np.arange(TEN))]
+
+
+def try_on_few(samples: TrackSamples, name: str, entry: ExplainerEntry, settings: Mapping[str, Any]) -> None:
+    """Let a method learn and answer within seconds, so that its faults are known before all samples are made.
+
+    On frames and scans, too, it is tried on the samples of the track of causes. Explainers with further training
+    samples are not tried.
+    """
+    track, explain = (samples.track, _hard) if samples.track.name == HARD_TRACK else (TRACKS[CAUSES_TRACK], _causes)
+    if entry.further:
+        return
+    print(f"{name}: a first try on ten samples", file=sys.stderr)
+    with TemporaryDirectory() as folder:
+        published = replace(samples.published, hashes={})
+        few = FewSamples(track, published, Path(folder), samples.processes, whole=samples.config)
+        [(source, seed, _)] = few.parts()
+        explain(MethodTrial(few, name, entry, dict(settings), ""), source, seed)
+
+
 def try_method(
     samples: TrackSamples, name: str, settings: Mapping[str, Any], training: str = ""
 ) -> tuple[Method, float]:
@@ -77,13 +119,16 @@ def try_method(
     require_settings(name, settings, track.kind, reenacted=track.name == HARD_TRACK)
     entry = explainer_entry(name, track.kind)
     parts = samples.parts()
-    samples.files([track.file(source, seed) for source, seed, _ in parts])  # together, so that several are made at once
+    files = [track.file(source, seed) for source, seed, _ in parts]
+    if not all((samples.folder / file).is_file() for file in files):
+        try_on_few(samples, name, entry, settings)
+    samples.files(files)  # together, so that several are made at once
     trial = MethodTrial(samples, name, entry, dict(settings), training)
     if track.name == SCANS_TRACK:
         answers = _scans(trial)
     else:
         explain = {CAUSES_TRACK: _causes, FRAMES_TRACK: _frames}.get(track.name, _hard)
-        answers = [explain(trial, source, seed) for source, seed, _ in parts]
+        answers = [explain(trial, source, seed) for source, seed, _ in progress(parts, name)]
     scores_N_C, named_N = np.full((len(rows), len(track.labels)), np.nan), np.full(len(rows), NOTHING_NAMED)
     for (_, _, part_rows), answer in zip(parts, answers, strict=True):
         scores_N_C[part_rows], named_N[part_rows] = answer.scores, answer.named

@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from gpca.__main__ import main
 from gpca.classifier.scores import Attribution
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process import plugins
-from gpca.tracks import leaderboard
+from gpca.tracks import leaderboard, samples
 from gpca.tracks.leaderboard import MARK
 
 from ..accessible import faults_of
@@ -104,6 +105,25 @@ def test_an_answer_that_cannot_be_is_refused_in_one_line(body, line, method, pub
     assert main(["bench", "causes", "own.py", "--samples", str(run)]) == 2
     said = capsys.readouterr().err.splitlines()
     assert len(said) == 2 and line in said[1]
+
+
+def test_a_method_is_tried_on_few_samples_before_all_are_made(
+    method, published, causes, tmp_path, monkeypatch, apart, capsys
+):
+    text = (tmp_path / method).read_text()
+    (tmp_path / "own.py").write_text(text.replace("return np.column_stack", "return [] or 1 / 0, np.column_stack"))
+    folders, few = [], replace(causes, registrations=replace(causes.registrations, axes=("ycb", 0)))
+
+    def make(names, folder, config, _processes):
+        folders.append(folder)
+        assert config["causes"]["test"] == 10
+        for name in names:
+            few.save(folder / name)
+
+    monkeypatch.setattr(samples, "make", make)
+    assert main(["bench", "causes", "own.py", "--samples", str(tmp_path / "none")]) == 2
+    assert "ZeroDivisionError" in capsys.readouterr().err
+    assert folders and tmp_path / "none" not in folders
 
 
 def test_scores_are_taken_by_the_names_of_their_labels():
