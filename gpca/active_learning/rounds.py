@@ -6,7 +6,7 @@ and the GPC is retrained; the learning curve is its accuracy on the test samples
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from copy import copy
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
@@ -14,7 +14,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from gpca.active_learning.acquisition import Pool, require_strategy, select
-from gpca.active_learning.settings import ALL_LABELS, ActiveLearningSettings
+from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.classifier.gpc import GPC
 from gpca.classifier.latents import Projection
 from gpca.errors import InputError
@@ -34,11 +34,6 @@ class Embedded:
     def rows(self, split: str) -> np.ndarray:
         """Return the rows of a split."""
         return np.flatnonzero(self.split == split)
-
-    def followed_by(self, other: Embedded) -> Embedded:
-        """Append other samples."""
-        names = ("embedding", "concept", "split")
-        return Embedded(*(np.concatenate([getattr(self, name), getattr(other, name)]) for name in names))
 
 
 Inputs = TypeVar("Inputs", np.ndarray, Projection)
@@ -81,7 +76,6 @@ def make_task(
     held_out: str,
     settings: ActiveLearningSettings,
     *axes: object,
-    classes: tuple[str, ...] = CONCEPTS,
     new_share: float | None = None,
 ) -> LabelingTask[np.ndarray]:
     """Split the training samples into initial ones, equally many of each other concept, and the pool of the rest.
@@ -90,7 +84,7 @@ def make_task(
     """
     train = generator(*axes, "initial", held_out).permutation(samples.rows("train"))
     concept_S = samples.concept
-    others = [concept for concept in classes if concept != held_out]
+    others = [concept for concept in CONCEPTS if concept != held_out]
     each = settings.initial // len(others)
     initial = np.concatenate([train[concept_S[train] == concept][:each] for concept in others])
     pool = np.setdiff1d(train, initial)
@@ -103,20 +97,18 @@ def make_task(
         raise InputError(
             f"active learning with {settings.initial} labeled samples of {' and '.join(others)}",
             f"leaves none of {len(train)} training samples for the pool",
-            f"lower active_learning.initial or raise {'registrations' if classes == CONCEPTS else 'causes'}.train",
+            "lower active_learning.initial or raise registrations.train",
         )
     rows = (initial, pool, samples.rows("test"))
     return LabelingTask(held_out, *(Samples(samples.embedding[part], concept_S[part]) for part in rows))
 
 
-def initial_gpc(
-    task: LabelingTask[np.ndarray], settings: ActiveLearningSettings, *axes: object, classes: tuple[str, ...] = CONCEPTS
-) -> GPC:
+def initial_gpc(task: LabelingTask[np.ndarray], settings: ActiveLearningSettings, *axes: object) -> GPC:
     """Fit the GPC on the initial labels, with scaling, inducing inputs and lengthscale initialized on the pool too.
 
     Otherwise, no inducing input would be near the new concept.
     """
-    gpc = GPC(classes, settings.gpc, *axes, "active_learning", task.held_out)
+    gpc = GPC(CONCEPTS, settings.gpc, *axes, "active_learning", task.held_out)
     gpc.fit(task.initial.h, task.initial.concept_N, task.labeled()[0])
     gpc.level()
     return gpc
@@ -128,24 +120,22 @@ def rounds(
     strategy: str,
     settings: ActiveLearningSettings,
     *axes: object,
-    answers_N: np.ndarray | None = None,
 ) -> Iterator[tuple[dict[str, float], list[int]]]:
     """Yield a step per round, the first before any label, and the rows of the pool labeled so far.
 
     A step has ``labels``, ``new_labels`` of the held-out concept, ``accuracy`` on all test samples, ``accuracy_new`` on
     those of the held-out concept, and ``epochs`` of the retraining. The `gpc` of :func:`initial_gpc`, which projected
-    the task, is not changed. By default, the oracle's answers for the pool are the truth.
+    the task, is not changed.
     """
     random = generator(*axes, "active_learning", task.held_out, strategy)
     gpc, needs_scores = copy(gpc), require_strategy(strategy).needs_scores
-    answers_N = task.pool.concept_N if answers_N is None else answers_N
     left = np.arange(len(task.pool))
     queried: list[int] = []
     yield step_of(task, gpc, queried, epochs=0), []
     while len(queried) < settings.labels and len(left):
         pool = pool_of(task, gpc, left, queried, needs_scores)
         chosen = left[select(strategy, pool, min(settings.batch, settings.labels - len(queried)), random)]
-        epochs = gpc.update(task.pool.h[chosen], answers_N[chosen], settings.iterations, settings.tolerance)
+        epochs = gpc.update(task.pool.h[chosen], task.pool.concept_N[chosen], settings.iterations, settings.tolerance)
         queried += chosen.tolist()
         left = np.setdiff1d(left, chosen)
         yield step_of(task, gpc, queried, epochs), list(queried)
@@ -175,56 +165,3 @@ def step_of(task: LabelingTask, classifier: Any, queried: list[int], epochs: int
         "accuracy_new": float(right_N[new_N].mean()) if new_N.any() else float("nan"),
         "epochs": epochs,
     }
-
-
-def answers(concept_N: np.ndarray, classes: tuple[str, ...], share: float, *axes: object) -> np.ndarray:
-    """Return an oracle's answers for N samples, of which this share is wrong.
-
-    Errors are drawn once for all shares, so that an oracle with more errors repeats those of a better one.
-    """
-    random = generator(*axes, "oracle")
-    order = random.permutation(len(concept_N))
-    steps_N = random.integers(1, len(classes), size=len(concept_N))
-    wrong = order[: round(share * len(concept_N))]
-    answer_N = np.array([classes.index(concept) for concept in concept_N], int)
-    answer_N[wrong] = (answer_N[wrong] + steps_N[wrong]) % len(classes)
-    return np.array(classes)[answer_N]
-
-
-@dataclass(frozen=True)
-class NewConceptTrial:
-    """A new concept in samples of one embedding, and shares of wrong answers of oracles besides the one without."""
-
-    embedding: str
-    samples: Embedded
-    held_out: str
-    classes: tuple[str, ...]
-    errors: tuple[float, ...] = ()
-
-
-def run_trial(
-    trial: NewConceptTrial, strategies: Iterable[str], settings: ActiveLearningSettings, *axes: object
-) -> Iterator[tuple[str, str, list[dict[str, float]]]]:
-    """Yield setting (embedding, and the errors if there are any), strategy and learning curve of each run.
-
-    Start, pool and the strategies' draws are equal for all oracles. `ALL_LABELS` uses the oracle without errors.
-    """
-    held_out, classes = trial.held_out, trial.classes
-    task = make_task(trial.samples, held_out, settings, *axes, classes=classes)
-    axes = (*axes, trial.embedding)
-    gpc = initial_gpc(task, settings, *axes, classes=classes)
-    projected = task.project(gpc)
-    for errors in (0.0, *trial.errors):
-        answers_N = answers(task.pool.concept_N, classes, errors, *axes, held_out)
-        for strategy in strategies:
-            if strategy != ALL_LABELS:
-                curve = [step for step, _ in rounds(projected, gpc, strategy, settings, *axes, answers_N=answers_N)]
-            elif not errors:
-                # The classifier is fitted again on all labels, as the limit of what labels can give.
-                full = GPC(classes, settings.gpc, *axes, ALL_LABELS, held_out).fit(*task.labeled())
-                last = step_of(task.project(full), full, list(range(len(task.pool))), settings.gpc.iterations)
-                curve = [step_of(projected, gpc, [], epochs=0), last]
-            else:
-                continue
-            setting = f"{trial.embedding}_errors_{round(100 * errors)}" if errors else trial.embedding
-            yield setting, strategy, curve

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from typing import Annotated
 
 from gpca.classifier.settings import GPCSettings
-from gpca.errors import InputError
 from gpca.pairs.perturbation import Concept
 from gpca.settings import Bounds, Count, Different, Distinct, OpenShare, PositiveShare, fields_of
 
@@ -73,33 +72,8 @@ class StreamSettings:
 
 ALL_LABELS = "all_labels"  # the whole pool at once, an upper bound
 PAIR = "pair"  # embedding of a depth frame that consists of measurements of the pair
-NEW_CONCEPT_STRATEGIES = ("bald_kmeans", "random", ALL_LABELS)
-# Embeddings by encoders of other jobs, and what they require.
-FROM_OTHERS = {"other_samples": "two seeds or more", "other_source": "two sources or more"}
+FRAME_STRATEGIES = ("bald_kmeans", "random", ALL_LABELS)
 Points = Annotated[int, Bounds(minimum=32, maximum=65536)]
-SeenBy = Literal["other_samples", "other_source", "pair"]
-NewCause = Literal["nominal", "geometry"]
-
-
-@dataclass(frozen=True)
-class NewConceptSettings:
-    """New concepts that no encoder was trained on."""
-
-    seeds: Count = 3
-    # By an encoder trained on other samples of the source, or on another source; or descriptors of the pair.
-    embeddings: Distinct[SeenBy] = ("other_samples", "other_source", "pair")
-    errors: Distinct[OpenShare] = (0.05, 0.1, 0.2, 0.3)  # shares of wrong answers of the oracle
-    erring: Distinct[SeenBy] = ("other_samples", "pair")  # embeddings for which these oracles are asked
-    points: Points = 512
-    causes: Distinct[NewCause] = ("nominal", "geometry")  # the latter is a shape that cannot hold the pose
-    geometry_train: Annotated[int, Bounds(minimum=2)] = 60  # at most, beside the samples of the other causes
-    geometry_test: Count = 30
-    geometry_candidates: Count = 1500  # at most, per split
-
-    def __post_init__(self) -> None:
-        if missing := set(self.erring) - set(self.embeddings):
-            fault = f"'{sorted(missing)[0]}' is not among the embeddings"
-            raise InputError("setting erring of new_concepts", fault, f"choose from {', '.join(self.embeddings)}")
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,6 @@
 """Draws the registrations of one source and seed by rejection, so that every state and cause has its share."""
 
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -143,22 +142,6 @@ def draw_causes(
     records = [record for split in SPLITS for record in drawing.of_split(split)]
     causes, icp_seconds_S = as_causes(records, (source, seed))
     return causes, drawing.tally, icp_seconds_S
-
-
-def draw_geometry(
-    objects: ObjectClouds, source: str, seed: int, settings: CauseSettings, wanted: Mapping[str, int], most: int
-) -> Causes | None:
-    """Draw failures without a cause: candidates refused by :func:`draw_causes`, of the same objects per split.
-
-    Of each split, `most` candidates give so many samples at most; None where a split has none.
-    """
-    limits = replace(settings.limits, nominal=settings.limits.failed)
-    alone = replace(settings, present=0.0, limits=limits, shares=Shares(0, 0, 0, 0, 0, geometry=1))
-    drawing = _Drawing(objects, source, seed, settings, alone)
-    of_splits = [drawing.up_to(most, split, Quotas(wanted[split], alone)) for split in SPLITS]
-    if not all(of_splits):
-        return None
-    return as_causes([record for records in of_splits for record in records], (source, seed))[0]
 
 
 def draw_further(

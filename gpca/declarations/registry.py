@@ -30,7 +30,6 @@ SECTIONS = (  # of the page, the paper's first
     f"{BEYOND}: scans registered to scans",
     f"{BEYOND}: how uncertain a pose is",
     f"{BEYOND}: explanations with another method or estimator",
-    f"{BEYOND}: concepts that no encoder has seen",
 )
 
 

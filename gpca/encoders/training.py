@@ -260,9 +260,8 @@ def load_model(
     settings: EncoderSettings,
     classes: tuple[str, ...] = CONCEPTS,
     axes: Axes | None = None,
-    unlike: Axes | None = None,
 ) -> Classifier:
-    """Load encoder and head for inference; source and seed of their samples have to be `axes`, and not `unlike`."""
+    """Load encoder and head for inference; source and seed of their samples have to be `axes`."""
     model = make_model(settings, classes)
     remedy = "regenerate them with Snakemake"
     require_file(path, "no such weights", remedy)
@@ -273,8 +272,6 @@ def load_model(
     except Exception as fault:  # torch raises errors of many kinds for a damaged or foreign file
         raise InputError(path, f"not the weights of backbone '{settings.backbone}', or damaged", remedy) from fault
     require_axes(path, trained_on, axes)
-    if trained_on == unlike:
-        raise InputError(path, "was trained on the same samples", "give weights of another source or seed")
     return model.eval()
 
 

@@ -11,11 +11,10 @@ from gpca.attribution.metrics import read_causal
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.declarations.experiment import Experiment, Tidy
 from gpca.declarations.plan import Run
-from gpca.declarations.result import Frame, Paths, figure, table
+from gpca.declarations.result import Frame, Paths, table
 from gpca.errors import InputError
 from gpca.evaluation.intervals import Clustered, Estimate
 from gpca.evaluation.measures import ALL, intervals, read_all_metrics, source_method_seed
-from gpca.experiments.confusions import draw_confusions
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.registry import explainer_entry
 from gpca.reporting.sheet import Row, Sheet, Show, crossed, show, where, with_label
@@ -225,18 +224,3 @@ def repeats(cells: Iterable[Cell]) -> str:
     cells = list(cells)
     samples = span(cell.test_samples // cell.seeds for cell in cells)
     return f"{over_clusters(span(cell.seeds for cell in cells), samples)}."
-
-
-@figure(
-    SECTION,
-    "What a missed concept is taken for",
-    """What GP-CA, the two explainers of the paper beside it, and the classifier on both clouds take each concept for,
-    pooled over sources, test samples and seeds. Each row of a matrix is a true concept; what is missing to 100 % is
-    abstained.""",
-    metrics="metrics.csv",
-)
-def fig_attribution_confusions(run: Run, metrics):
-    return draw_confusions(metrics, titles(run), COMPARED, ", ".join(run.source_titles.values()))
-
-
-COMPARED = ("gpca", "shap_removal", "sa_local_removal", "gpca_pair")  # the first of the figure

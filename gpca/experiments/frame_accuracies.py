@@ -29,7 +29,7 @@ FRAME_FILES = {
     "real_world.csv",
     **FRAME_FILES,
     one_encoder_files="predictions/{one_encoder_prediction}.csv",
-    label_files="frame_labels/{frames}/{new_concept_strategy}/seed{frame_label_seed}.csv",
+    label_files="frame_labels/{frames}/{frame_label_strategy}/seed{frame_label_seed}.csv",
 )
 def collect(
     run: Run, prediction_files: Paths, pose_files: Paths, one_encoder_files: Paths = (), label_files: Paths = ()

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from gpca.active_learning.curves import TABLE, collect_curves
-from gpca.active_learning.settings import ALL_LABELS, PAIR, FrameLabelSettings
+from gpca.active_learning.settings import ALL_LABELS, FRAME_STRATEGIES, PAIR, FrameLabelSettings
 from gpca.declarations.experiment import Experiment, LeftOut
 from gpca.declarations.plan import Run
 from gpca.declarations.result import Frame, Paths, table
@@ -45,6 +45,7 @@ EXPERIMENT = Experiment(
     name="frame_labels",
     sections={"frame_labels": FrameLabelSettings},
     names=lambda config, sources: {
+        "frame_label_strategy": list(FRAME_STRATEGIES),
         "frame_label_seed": list(config["seeds"])[: config["frame_labels"]["seeds"]],
         "frame_label_backbone": [
             name for name in config["real_world"]["backbones"] if name in config["frame_labels"]["backbones"]
@@ -62,7 +63,7 @@ LEARN = Step(
         "embeddings": "embeddings/{frames}/{*frame_label_backbone}/none/seed{seed}.npz",
     },
     outputs={"out": "frame_labels/{frames}/{*strategy}/seed{seed}.csv"},
-    where={"strategy": "new_concept_strategy"},
+    where={"strategy": "frame_label_strategy"},
     settings=lambda plan, wildcards: {
         "frame_labels": plan.config["frame_labels"],
         "active_learning": {"rare": plan.config["active_learning"]["rare"]},
@@ -100,7 +101,7 @@ ENDS = {  # columns beside the labels to the targets
     """How many labels a classifier needs on depth frames, chosen by BALD with k-means or at random, to the paper's
     target of 70 % and to its neighbors (Sec. IV-E): on the embeddings of DGCNN, the paper's backbone, beside those
     of another, and on measurements of the pair. In bold is the strategy that needs fewer labels.""",
-    after="real_world_failures",
+    after="confusion_real_world",
     metrics="real_world.csv",
 )
 def table6_labels(run: Run, metrics: Frame) -> Table:

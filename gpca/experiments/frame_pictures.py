@@ -1,6 +1,5 @@
 """Pictures of depth frames: a frame explained (Fig. 5), confusions, and the most confident mistakes."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -8,13 +7,11 @@ import numpy as np
 
 from gpca.attribution.predictions import read_predictions
 from gpca.declarations.plan import Run
-from gpca.declarations.result import Figure, Frame, Paths, figure
+from gpca.declarations.result import Figure, Frame, figure
 from gpca.errors import InputError
-from gpca.evaluation.measures import source_method_seed
 from gpca.experiments.confusions import draw_confusions
-from gpca.experiments.frame_views import draw_scores
 from gpca.experiments.frames import encoder_title, read_together, title_of_frames
-from gpca.experiments.registration_stages import source_before_icp
+from gpca.experiments.registration_stages import draw_scores, source_before_icp
 from gpca.frames.instances import Instances
 from gpca.frames.synthesis import HALF_SPACE, OCCLUDER
 from gpca.io.container import require_same_samples
@@ -22,16 +19,13 @@ from gpca.io.csv_file import numbers, read_csv
 from gpca.io.files import read_image
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import FRAME_COLUMNS, Registrations
-from gpca.reporting.figures.cloud_views import draw_clouds, legend_of_clouds
+from gpca.reporting.figures.cloud_views import legend_of_clouds
 from gpca.reporting.figures.panels import panels, write_below
 from gpca.reporting.figures.style import (
     BLACK,
-    SMALL_PT,
     SOURCE_COLOR,
     TARGET_COLOR,
-    TEXT_WIDTH_IN,
     YELLOW,
-    use_style,
     write_title,
 )
 from gpca.reporting.words import BOP_TITLES, object_of_frames
@@ -227,62 +221,3 @@ def draw_real_world_confusions(run: Run, metrics: Frame) -> Figure:
     methods = [f"{backbone}-{first}" for backbone in frames["backbones"]]
     titles = {method: encoder_title(*method.split("-")) for method in methods}
     return draw_confusions(metrics, titles, (), title_of_frames(run.config), "{:.1f} %\nn = {:.0f}")
-
-
-@figure(
-    SECTION,
-    "Most confident mistakes on depth frames",
-    """The ten most confident mistakes of GP-CA on depth frames, over all seeds: cloud over model, true and named
-    cause, and scores.""",
-    name="real_world_failures",
-    objects_npz="objects/{frames}.npz",
-    registrations_npz="registrations/{frames}/seed{seed}.npz",
-    poses_csv="poses/{frames}/seed{seed}.csv",
-    predictions_csv="predictions/{frames}/{first_backbone}/seed{seed}.csv",
-)
-def draw_real_world_failures(
-    run: Run, objects_npz: str | Path, registrations_npz: Sequence[str | Path], poses_csv: Paths, predictions_csv: Paths
-) -> Figure:
-    """The test samples of all seeds that were attributed wrongly with the highest score, one of each instance.
-
-    The three lists of files run through the seeds in the same order.
-    """
-    objects = ObjectClouds.load(objects_npz)
-    shown = mistakes_of(poses_csv, predictions_csv).head(SHOWN)
-    rows = max(1, -(-len(shown) // PANELS_PER_ROW))
-    drawing = use_style().figure(figsize=(TEXT_WIDTH_IN, 0.22 + 2.1 * rows), layout="constrained")
-    parts = drawing.subfigures(rows, PANELS_PER_ROW, squeeze=False).flat
-    loaded = {file: Registrations.load(registrations_npz[file]) for file in sorted(set(shown["file"]))}
-    for part, (_, mistake) in zip(parts, shown.iterrows(), strict=False):
-        registrations, row = loaded[mistake["file"]], int(mistake["row"])
-        above, below = part.subplots(2, 1, height_ratios=(2.5, 1))
-        index = int(registrations.object_index[row])
-        model, source = objects.points(index)[:2048] / objects.diameters_m[index], registrations.cloud(row)
-        # Seen from the side that was measured, which is nearer than the model's middle.
-        towards = (source - model.mean(axis=0)).mean(axis=0) + np.array([1e-6, 0, 0])
-        towards = towards / np.linalg.norm(towards)
-        right = np.cross([0.0, 0.0, 1.0] if abs(towards[2]) < 0.95 else [0.0, 1.0, 0.0], towards)
-        right /= np.linalg.norm(right)
-        view = np.array([right, np.cross(towards, right), towards])
-        target, seen = (cloud[:: max(1, len(cloud) // 1500)] @ view.T for cloud in (model, source))
-        draw_clouds(above, target, seen, size=1.2)
-        draw_scores(below, mistake)
-        taken = f"{mistake['concept_true']} taken for {mistake['concept_predicted']}"
-        words = f"{object_of_frames(registrations.object_name[row])}\n{taken}\n"
-        part.suptitle(f"{words}pose {100 * mistake['icp_error']:.0f} % $d$ off", fontsize=SMALL_PT, linespacing=1.15)
-    write_title(drawing, f"{title_of_frames(run.config)}{'' if len(shown) else ': no mistake in any seed'}")
-    return drawing
-
-
-def mistakes_of(poses_csv: Paths, predictions_csv: Paths) -> Frame:
-    """Wrongly attributed test samples, the most confident first, one of each instance and concept."""
-    import pandas as pd
-
-    parts = []
-    for file, (poses, predictions) in enumerate(zip(poses_csv, predictions_csv, strict=True)):
-        samples = read_samples(poses, predictions).rename_axis("row").reset_index()
-        wrong = (samples["split"] == "test") & (samples["concept_predicted"] != samples["concept_true"])
-        scores = samples[[name for name in samples.columns if name.startswith("score_")]].max(axis=1)
-        parts.append(samples.assign(file=file, score=scores, seed=source_method_seed(predictions)[2])[wrong])
-    mistakes = pd.concat(parts).sort_values(["score", "seed", "row"], ascending=[False, True, True])
-    return mistakes.drop_duplicates(["instance", "concept_true"]).reset_index(drop=True)

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from gpca.active_learning.curves import CENSORED_BY, read_curves
-from gpca.causes.dataset import Causes
 from gpca.declarations.result import Figure, Frame, Paths
 from gpca.errors import InputError
 from gpca.evaluation.intervals import mean_interval
@@ -136,19 +135,14 @@ OVER_TEST_SAMPLES = ("final_accuracy", "final_accuracy_new", "area_under_curve")
 Clusters = Mapping[tuple[str, int], int]  # (source, seed) -> number of families of the test samples
 
 
-def families(files: Paths, load: Callable[[Path, tuple[str, int]], Registrations] = Registrations.load) -> Clusters:
+def families(files: Paths) -> Clusters:
     """Number of families of the test samples in files named ``…/{source}/seed{seed}.npz``."""
     counts = {}
     for path in map(Path, files):
         axes = path.parent.name, seed_of_file(path)
-        registrations = load(path, axes)
+        registrations = Registrations.load(path, axes)
         counts[axes] = len(np.unique(registrations.cluster[registrations.rows("test")]))
     return counts
-
-
-def families_with_causes(files: Paths) -> Clusters:
-    """Number of families of the test samples of registrations with measured causes."""
-    return families(files, lambda path, axes: Causes.load(path, axes).registrations)
 
 
 def quantity(metric: str, title: str, method: str = "", concept: str = "", **options: Any) -> Show:

@@ -139,7 +139,7 @@ def policy_titles(config: Mapping[str, Any]) -> dict[str, str]:
 
 EXPERIMENT = Experiment(
     name="recovery",
-    beside=("recovery_measures", "recovery_example", "recovery_curves"),
+    beside=("recovery_measures", "recovery_example"),
     sections={"recovery": Section},
     check=check,
     optional_entries={"recovery.actions": Names("action", lambda: ACTIONS)},

@@ -9,8 +9,8 @@ import numpy as np
 
 from gpca.declarations.plan import Run
 from gpca.declarations.result import Figure, figure
-from gpca.experiments.frame_views import draw_score_bars
 from gpca.experiments.recovery import SECTION, tables_title
+from gpca.experiments.registration_stages import draw_score_bars
 from gpca.io.arrays import load_arrays
 from gpca.objects.entry import dataset_of
 from gpca.pairs.perturbation import CONCEPTS

@@ -32,7 +32,7 @@ PAPER = (
 GROUPS = {
     "Causes": ("table9_causes", "failures", "loophole", "table10_controls", "table9_shift", "guarantee"),
     "Scans": ("table18_scan_causes", "scan_failures", "table17_scans", "table9_frames", "fig5_real_world_example"),
-    "Repair and recovery": ("table20_repair", "table11_registration", "table8_recovery", "recovery_rates"),
+    "Repair and recovery": ("table20_repair", "table11_registration", "table8_recovery"),
 }
 REST = "Everything else"
 DOCS = "../../docs"  # from the folder of a run in a checkout, results/{run}

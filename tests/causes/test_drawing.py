@@ -6,8 +6,8 @@ import pytest
 
 from gpca.causes import drawing
 from gpca.causes.candidate import Registrar, Unmeasurable
-from gpca.causes.drawing import Quotas, Tally, apportion, draw_causes, draw_geometry, group_of
-from gpca.causes.settings import CauseSettings, CauseSeverities, Limits, Shares
+from gpca.causes.drawing import Quotas, Tally, apportion, draw_causes, group_of
+from gpca.causes.settings import CauseSettings, CauseSeverities, Shares
 from gpca.causes.truth import Truth
 from gpca.errors import InputError
 from gpca.rigid import inverse, rotation_angle_rad, transform
@@ -117,18 +117,6 @@ def test_a_single_object_is_refused(four):
     one = replace(four, names=four.names[2:3], diameters_m=four.diameters_m[2:3], clouds=four.clouds[2:3])
     with pytest.raises(InputError, match="causes of one: has objects of one family alone, which cannot be split"):
         draw_causes(one, "one", 100, CauseSettings(**FEW))
-
-
-def test_what_fails_without_a_cause_is_drawn_of_other_objects_for_each_split(four):
-    often = CauseSettings(**FEW, limits=Limits(nominal=0.012, failed=0.014))
-    geometry = draw_geometry(four, "four", 100, often, {"train": 3, "test": 2}, 60)
-    assert [len(geometry.rows(split)) for split in ("train", "test")] == [3, 2]
-    assert not geometry.applied.any()
-    assert (geometry.truth.error[:, 0] >= 0.014).all()
-    assert set(geometry.truth.dominant.tolist()) == {"geometry"}
-    shown = [set(geometry.registrations.object_name[geometry.rows(split)].tolist()) for split in ("train", "test")]
-    assert not shown[0] & shown[1]
-    assert draw_geometry(four, "four", 100, CauseSettings(**FEW), {"train": 3, "test": 2}, 4) is None  # none fails
 
 
 def test_the_error_shown_is_that_of_the_first_run(causes, subjects):

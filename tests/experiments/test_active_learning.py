@@ -19,7 +19,7 @@ from gpca.experiments.active_learning import (
     table3_stream,
     titles,
 )
-from gpca.experiments.label_curves import MOST_LINES, STYLES, families, families_with_causes, mean_curves
+from gpca.experiments.label_curves import MOST_LINES, STYLES, families, mean_curves
 from gpca.reporting.figures.cloud_views import draw_query
 from tests.figures import words_of
 
@@ -172,14 +172,6 @@ def test_the_families_of_test_samples_alone_are_counted_and_a_file_of_another_se
     assert families([tmp_path / "tiny/seed0.npz"]) == {("tiny", 0): 2}
     with pytest.raises(InputError, match="seed"):
         families([tmp_path / "tiny/seed1.npz"])
-
-
-def test_registrations_with_measured_causes_are_counted_alike(causes, tmp_path):
-    (tmp_path / "four").mkdir()
-    causes.save(tmp_path / "four/seed100.npz")
-    registrations = causes.registrations
-    number = len(set(registrations.cluster[registrations.rows("test")].tolist()))
-    assert families_with_causes([tmp_path / "four/seed100.npz"]) == {("four", 100): number}
 
 
 CURVES = ("random", "bald_kmeans", "margin")

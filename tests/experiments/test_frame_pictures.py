@@ -15,12 +15,10 @@ from gpca.experiments.frame_pictures import (
     covered,
     draw_real_world_confusions,
     draw_real_world_example,
-    draw_real_world_failures,
-    mistakes_of,
     read_samples,
 )
-from gpca.experiments.frame_views import draw_scores
 from gpca.experiments.frames import read_together
+from gpca.experiments.registration_stages import draw_scores
 from gpca.frames.synthesis import OCCLUDER, FrameSettings, make_frame_registrations
 from gpca.io.csv_file import write_csv
 from gpca.pairs.perturbation import CONCEPTS
@@ -77,13 +75,6 @@ def results(tiny, tmp_path_factory):
     return folder
 
 
-def test_the_most_confident_mistakes_come_first(results):
-    mistakes = mistakes_of([results / "poses.csv"], [results / "real_rgbd/dgcnn-none/seed0.csv"])
-    assert mistakes["sample"].tolist() == ["3", "0"]
-    assert mistakes["score"].tolist() == pytest.approx([0.9, 0.6])
-    assert (mistakes["split"] == "test").all()
-
-
 def test_fig5_shows_a_test_sample_that_an_occluder_covers_and_that_is_named_right(results):
     samples = read_samples(results / "poses.csv", results / "real_rgbd/dgcnn-none/seed0.csv")
     pixels_I = np.arange(samples["instance"].max() + 1)
@@ -119,14 +110,13 @@ def test_what_is_covered_is_what_lies_not_between_the_points_that_were_kept():
     assert not mask[:10].any() and not mask[:, 60:].any()
 
 
-@pytest.mark.parametrize("picture", ["example", "failures", "confusions"])
+@pytest.mark.parametrize("picture", ["example", "confusions"])
 def test_a_picture_is_drawn_and_drawing_again_changes_no_byte(picture, results, same_bytes):
     poses, predictions = results / "poses.csv", results / "real_rgbd/dgcnn-none/seed0.csv"
     instances, objects, registrations = (results / f"{name}.npz" for name in ("instances", "objects", "registrations"))
     of_example = instances, objects, registrations, poses, predictions
     draw = {
         "example": lambda: draw_real_world_example(RUN, *of_example),
-        "failures": lambda: draw_real_world_failures(RUN, objects, [registrations], [poses], [predictions]),
         "confusions": lambda: draw_real_world_confusions(RUN, read_together(results / "metrics.csv")),
     }
     assert same_bytes(draw[picture]).std() > 5

@@ -10,8 +10,7 @@ import pytest
 from gpca.errors import InputError
 from gpca.evaluation.measures import AGAINST, KEYS, NUMBERS, tidy
 from gpca.evaluation.measures import COLUMNS as INTERVALS
-from gpca.experiments.recovery import policy_titles, table8_recovery
-from gpca.experiments.recovery_curves import recovery_rates
+from gpca.experiments.recovery import table8_recovery
 from gpca.experiments.recovery_example import fig1_recovery_example, fig6_mitigation
 from gpca.io.arrays import save_arrays
 from gpca.pairs.perturbation import CONCEPTS
@@ -93,21 +92,6 @@ def test_table8_pools_the_seeds_and_holds_the_bounds_over_tables(metrics, interv
         assert told in text
     with pytest.raises(InputError, match="has nothing to show"):
         table8_recovery(run_of("oracle"), metrics, intervals, differences, {})
-
-
-def test_rates_of_few_policies_are_drawn_sorted_with_the_intervals_of_the_table(intervals, differences, same_bytes):
-    fixed = intervals[intervals["method"] == "random"].assign(method="always_denoise")
-    both = pd.concat([intervals, fixed])
-    run = run_of("gpca", "random", "always_denoise")
-    assert np.ptp(same_bytes(lambda: recovery_rates(run, both, differences))) > 100
-    left, right = recovery_rates(run, both, differences).axes
-    titles = policy_titles(run.config)
-    assert [label.get_text() for label in left.get_yticklabels()] == [titles["random"], titles["gpca"]]
-    spans = [list(line.get_xdata()) for line in left.get_lines() if len(line.get_xdata()) == 2]
-    assert [30, 60] in [pytest.approx(span) for span in spans]  # of GP-CA within one action
-    assert len(right.get_lines()) == 3  # one difference with its interval, and zero
-    with pytest.raises(InputError, match="have no recovery rates"):
-        recovery_rates(run_of("oracle"), intervals, differences)
 
 
 def test_the_mapping_is_drawn_from_the_thresholds(tmp_path, same_bytes):

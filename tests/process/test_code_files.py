@@ -116,10 +116,6 @@ STEPS = {  # module -> files that it depends on, and some that it does not
         {"gpca/classifier/latents.py", "gpca/active_learning/stream.py", "gpca/active_learning/retraining.py"},
         {"gpca/explainers/interface.py", "gpca/encoders/training.py"},
     ),
-    "gpca.steps.new_concepts": (
-        {"gpca/causes/drawing.py", "gpca/causes/descriptors.py", "gpca/active_learning/rounds.py"},
-        {"gpca/explainers/interface.py", "gpca/active_learning/stream.py"},
-    ),
     "gpca.steps.frame_labels": (
         {"gpca/active_learning/retraining.py", "gpca/pairs/distances.py"},
         {"gpca/explainers/interface.py", "gpca/active_learning/stream.py", "gpca/frames/synthesis.py"},

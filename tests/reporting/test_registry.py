@@ -119,7 +119,7 @@ def only(_run, learned):
 
 
 def test_short_names_are_the_papers_a_misspelt_one_is_answered_and_sections_keep_their_order():
-    names = ["table1_single", "table1_extended", "fig2_overview", "reliability", "fig_attribution_confusions"]
+    names = ["table1_single", "table1_extended", "fig2_overview", "reliability", "fig_confusions"]
     short = targets(result(name=name) for name in names)
     assert {key: value.name for key, value in short.items()} == {"table1": "table1_single", "fig2": "fig2_overview"}
     assert unknown_target("tabel2", ["table2", "page"]).endswith("did you mean table2?")

@@ -32,7 +32,7 @@ STEPS = {  # module of gpca.steps -> the steps that it has, functions of their n
 }
 MODULES = {  # modules with a function ``run``
     **{name: f"gpca.steps.{name}" for name in ("exchange", "frame_labels", "guarantee", "kernel_grid")},
-    **{name: f"gpca.steps.{name}" for name in ("new_concepts", "runtime")},
+    "runtime": "gpca.steps.runtime",
     "estimate": "gpca.steps.estimates",
     "recover": "gpca.steps.recovery",
     "register_methods": "gpca.steps.registration_trials",
@@ -54,7 +54,6 @@ LISTS = {  # which names of a step are lists, and not of one seed, file or name
     "kernel_grid": "seeds registrations embeddings out predictions",
     "learning_curve": "causes descriptors samples",
     "oracles": "predictions",
-    "new_concepts": "encoders encoders_of strategies out",
     "shift": "seeds registrations other_registrations embeddings encoders out",
     "learners": "seeds learners sets out",
     "register_methods": "seeds methods registrations rows timings",

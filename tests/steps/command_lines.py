@@ -185,24 +185,6 @@ STEP_OPTIONS = {
         "--embeddings-without": "without.npz", "--strategies": ["random", "bald_kmeans", "stream_bald"],
         "--out": ["random.csv", "bald_kmeans.csv", "stream_bald.csv"],
     },
-    "new_concepts": COMMON | {
-        "--settings": {
-            "new_concepts": {
-                "embeddings": ["other_source", "pair"], "errors": [0.5], "erring": ["pair"],
-                "points": 64, "geometry_train": 2, "geometry_test": 1,
-                "geometry_candidates": 2,
-            },
-            "active_learning": LEARNING | {"held_out": ["overlap"], "initial": 4},
-            "encoder": ENCODER, "cause_encoder": ENCODER,
-            "causes": CAUSES, "descriptors": DESCRIBED,
-            "icp": ICP,
-        },
-        "--seed": 0, "--registrations": "registrations.npz", "--encoders": "other.pt",
-        "--encoders-of": "other_source", "--objects": "objects.npz", "--causes": "causes.npz",
-        "--descriptors": "descriptors.npz", "--cause-encoder": "cause_weights.pt",
-        "--cause-embeddings": "cause_embeddings.npz", "--strategies": ["bald_kmeans", "all_labels"],
-        "--out": ["new_bald_kmeans.csv", "new_all_labels.csv"],
-    },
     "frame_labels": COMMON | {
         "--settings": {
             "frame_labels": {"initial": 6, "share": 0.4, "labels": 2, "least": 1, "points": 64},

@@ -17,7 +17,6 @@ from .spoiling import refused
 
 FREE = {  # what a user may take from anywhere
     ("shift", "--other-registrations"),
-    ("new_concepts", "--encoders"),
     ("label", "registrations.npz"),
     ("learning_curve", "--samples"),  # it learns from further samples of all sources
 }
@@ -95,11 +94,6 @@ def test_every_file_of_arrays_and_weights_says_of_what_it_is(made):
     for path in (path for path in made.glob("*.pt") if path.stem != "model"):
         content = torch.load(path, weights_only=True)
         assert (content["source"], content["seed"]) == ("other" if path.stem == "other" else "tiny", 0)
-
-
-def test_the_own_source_is_not_another_one(folder, capsys):
-    changes = {"--encoders": "weights.pt"}
-    refused(folder, capsys, "new_concepts", lambda _: None, changes, "weights.pt: was trained on the same samples")
 
 
 def test_several_files_are_trained_on_together_where_each_has_its_source(folder, capsys):

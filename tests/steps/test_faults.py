@@ -180,13 +180,6 @@ FAULTS = {
         (untouched, settings("active_learning", initial=18), "leaves none of 18 training samples for the pool; lower"),
         (untouched, settings("active_learning", stream={"arrivals": 60, "quiet": 2}), "stream of 60 arrivals: needs"),
     ],
-    "new_concepts": [
-        (removed("other.pt"), {}, "other.pt: no such weights"),
-        (truncated("cause_weights.pt"), {}, f"cause_{NOT_THE_WEIGHTS}, or damaged"),
-        (removed("causes.npz"), {}, "causes.npz: no such file"),
-        (arrays_changed("cause_embeddings.npz", sample=later), {}, f"cause_embeddings.npz: {OTHER_SAMPLES}"),
-        (arrays_changed("descriptors.npz", sample=later), {}, f"descriptors.npz: {OTHER_SAMPLES}"),
-    ],
     "frame_labels": [
         (arrays_changed("embeddings.npz", sample=later), {}, f"embeddings.npz: {OTHER_SAMPLES}"),
         (untouched, settings("frame_labels", frame_labels={"initial": 18}), "leaves none of 18 training samples"),

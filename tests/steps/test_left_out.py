@@ -23,15 +23,6 @@ def test_a_control_that_the_source_does_not_admit_is_named_and_its_file_holds_no
     assert set(rows["control"]) == {"paper", "shuffled"}
 
 
-def test_new_concepts_that_cannot_be_tried_are_left_out_and_named(folder, capsys):
-    assert main(arguments("new_concepts", {"--encoders": [], "--encoders-of": []})) == 0
-    err = capsys.readouterr().err
-    assert "new concepts of tiny: 'other_source' is skipped: it needs two sources or more" in err
-    assert "'geometry' is skipped: none of 2 candidates of a split fails without a cause" in err
-    tried = {line.split(",")[0] for line in (folder / "new_bald_kmeans.csv").read_text().splitlines()[1:]}
-    assert tried == {"pair", "pair_errors_50", "pretrained"}
-
-
 EXCHANGE = STEP_OPTIONS["exchange"]["--settings"]["exchange"]
 
 

@@ -11,9 +11,7 @@ from ..documents import block, blocks_of
 from .conftest import without_ends
 
 SMOKE = ("--configfile", "config/smoke.yaml")
-COLLECTORS = dict.fromkeys(
-    ("metrics", "timings", "attribution_intervals", "fig_attribution_confusions", "table1_extended"), 1
-)
+COLLECTORS = dict.fromkeys(("metrics", "timings", "attribution_intervals", "table1_extended"), 1)
 OLD_ROW = "coffee_cup"  # a source that no setting of the smoke run names
 
 
@@ -48,7 +46,6 @@ def test_a_folder_of_meshes_and_a_rule_of_an_own_source_become_rows(finished, pl
         "control",
         "diagnoses",
         "learning_curve",
-        "new_concepts",
         "estimate",
         "estimator_",
         "reference_samples",

@@ -50,10 +50,6 @@ NEEDS = {  # a table: what is made for it, and what is not
         "reenactments/ycb diagnoses/ycb/gpca frame_diagnoses/ guarantee/reenact",
         "predictions estimates learning_curve controls/ uncertainty/ model.pt",
     ),
-    "table15_new_concepts": (
-        "causes/ycb cause_encoders/ycb embeddings/ycb active_learning/ycb new_concepts/ycb predictions/ycb/rule",
-        "predictions/ycb/gpca diagnoses controls/ uncertainty/",
-    ),
 }
 
 
@@ -65,7 +61,7 @@ def test_a_table_needs_its_own_stages_alone(planned, table):
 EDITS = {  # a module: what is made again where it has changed, and what is not
     "gpca/classifier/gpc.py": (
         "predictions/ycb/gpca/ predictions/real_rgbd/gpca_pair diagnoses/ycb/gpca active_learning/ycb kernels/ "
-        "learners/ model.pt recovery/ controls/ exchange/ new_concepts/ table2_per_concept fig4_pipeline",
+        "learners/ model.pt recovery/ controls/ exchange/ table2_per_concept fig4_pipeline",
         "registrations encoders/ embeddings/ uncertainty/ methods/ estimates/ descriptors/ shifted/ residuals_forest "
         "predictions/ycb/shap_additive predictions/ycb/softmax_head diagnoses/ycb/gate_rmse fig3_concepts",
     ),
@@ -76,7 +72,7 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
         "kernels/ figures/fig3",
     ),
     "gpca/active_learning/acquisition.py": (
-        "active_learning/ycb new_concepts/ frame_labels/ runtime.csv table6_labels",
+        "active_learning/ycb frame_labels/ runtime.csv table6_labels",
         "predictions embeddings learners diagnoses/ model.pt kernels/",
     ),
     "gpca/active_learning/stream.py": ("active_learning/ycb table3_stream", "predictions embeddings learners"),
