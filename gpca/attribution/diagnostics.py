@@ -4,11 +4,9 @@ Of S test samples: ``wrong_S`` whether each was named wrongly, ``confidence_S`` 
 explainer is surer, ``p_S_C`` class probabilities and ``target_S`` the numbers of the true classes.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 
-from gpca.evaluation.intervals import mean_ranks, quantile_bounds
+from gpca.evaluation.intervals import mean_ranks
 
 BINS = 15  # calibration errors are measured over so many (Guo et al. 2017)
 LEAST_PROBABILITY = 1e-12  # that a true class counts with
@@ -38,18 +36,14 @@ def augrc(confidence_S: np.ndarray, wrong_S: np.ndarray) -> float:
     return float(_cumulative_errors(confidence_S, wrong_S).mean() / len(wrong_S))
 
 
-def calibration_error(p_S_C: np.ndarray, target_S: np.ndarray, adaptive: bool = False) -> float:
+def calibration_error(p_S_C: np.ndarray, target_S: np.ndarray) -> float:
     """Return the expected calibration error of the largest probability (ECE).
 
-    The mean over `BINS` bins of |mean confidence - accuracy|, weighted by their samples. The bins are equally wide or,
-    `adaptive`, hold equally many samples.
+    The mean over `BINS` equally wide bins of |mean confidence - accuracy|, weighted by their samples.
     """
-    return _binned_gap(p_S_C.max(axis=1), p_S_C.argmax(axis=1) == target_S, adaptive)
-
-
-def classwise_calibration_error(p_S_C: np.ndarray, target_S: np.ndarray) -> float:
-    """Return the mean over the classes of the calibration error of each class's own probability (Kull et al. 2019)."""
-    return float(np.mean([_binned_gap(p_S, target_S == c) for c, p_S in enumerate(p_S_C.T)]))
+    p_S, hit_S = p_S_C.max(axis=1), p_S_C.argmax(axis=1) == target_S
+    bin_S = np.minimum((p_S * BINS).astype(int), BINS - 1)  # a confidence of 1 is in the last
+    return float(np.abs(np.bincount(bin_S, weights=p_S - hit_S, minlength=BINS)).sum() / len(p_S))
 
 
 def negative_log_likelihood(p_S_C: np.ndarray, target_S: np.ndarray) -> float:
@@ -69,26 +63,9 @@ def rank_correlation(uncertainty_S: np.ndarray, distance_S: np.ndarray) -> float
     return float(np.corrcoef(mean_ranks(uncertainty_S), mean_ranks(distance_S))[0, 1])
 
 
-def bootstrap_interval(
-    statistic: Callable[..., float], *samples: np.ndarray, random: np.random.Generator, resamples: int = 1000
-) -> tuple[float, float]:
-    """Return the percentile interval (95 %) of a statistic over resamples of the S samples (Efron 1979)."""
-    n = len(samples[0])
-    values_R = [statistic(*(array[rows_S] for array in samples)) for rows_S in random.integers(n, size=(resamples, n))]
-    return quantile_bounds(np.array(values_R))
-
-
 def _cumulative_errors(confidence_S: np.ndarray, wrong_S: np.ndarray) -> np.ndarray:
     """Return the expected number of errors among the k most confident, k = 1 … S, equal confidences in random order."""
     _, group_S, size_G = np.unique(-np.asarray(confidence_S, float), return_inverse=True, return_counts=True)
     errors_G = np.bincount(group_S, weights=wrong_S, minlength=len(size_G))
     ends_G = np.concatenate([[0], np.cumsum(size_G)])
     return np.interp(np.arange(1, len(wrong_S) + 1), ends_G, np.concatenate([[0], np.cumsum(errors_G)]))
-
-
-def _binned_gap(p_S: np.ndarray, hit_S: np.ndarray, adaptive: bool = False) -> float:
-    bin_S = np.minimum((p_S * BINS).astype(int), BINS - 1)  # a confidence of 1 is in the last
-    if adaptive:
-        bin_S[np.argsort(p_S, kind="stable")] = np.arange(len(p_S)) * BINS // len(p_S)
-    gaps_B = np.bincount(bin_S, weights=p_S - hit_S, minlength=BINS)
-    return float(np.abs(gaps_B).sum() / len(p_S))

@@ -37,8 +37,6 @@ HEIGHT_IN = 2.4
 SMALLEST_PART = 0.02  # Smaller parts of an object's pixels lie at its rim, where no point was drawn.
 AROUND = (2.5, 1.2)  # The first picture, and the two others, show this many times the object's extent.
 POSE_COLUMNS = ("sample", "split", "instance", "init_error", "icp_error", "lost_to")
-SHOWN = 10
-PANELS_PER_ROW = 5
 
 
 @figure(

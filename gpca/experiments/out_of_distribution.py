@@ -26,12 +26,10 @@ from gpca.reporting.tables.builder import over_clusters
 from gpca.reporting.tables.cells import rows_where
 from gpca.reporting.tables.table import Table
 from gpca.reporting.words import in_words, span
-from gpca.seeds import generator
 from gpca.settings import Keys, changes_of
 from gpca.steps.shift import ShiftSettings
 
 TABLE = "learners/"  # prefix of the set in the column `table` of the numbers
-RESAMPLES = 200
 RHO = f"rho_max_score_{DISTANCES[0]}"
 AREAS = {"aurc": weighted.aurc, "excess_aurc": weighted.excess_aurc, "augrc": weighted.augrc}
 
@@ -127,8 +125,6 @@ def collect(run: Run, prediction_files: Paths, set_files: Paths) -> tuple[Frame,
             values = correlations(subset)
             if "+" not in name:
                 values |= probability_metrics(subset)
-            if name == "in_distribution":
-                values |= bootstrap_bounds(subset, source, seed)
             by_seed += [(TABLE + name, source, learner, metric, ALL, seed, float(v)) for metric, v in values.items()]
     for (source, learner), parts in answers.items():
         for name, subset in predicted.sets_of(pd.concat(parts, ignore_index=True)).items():
@@ -166,8 +162,6 @@ def probability_metrics(rows: Frame) -> dict[str, float]:
         "accuracy": np.mean(~wrong_S),
         "confidence": p_S_C.max(axis=1).mean(),
         "ece": diagnostics.calibration_error(p_S_C, target_S),
-        "adaptive_ece": diagnostics.calibration_error(p_S_C, target_S, adaptive=True),
-        "classwise_ece": diagnostics.classwise_calibration_error(p_S_C, target_S),
         "nll": diagnostics.negative_log_likelihood(p_S_C, target_S),
         "brier": diagnostics.brier_score(p_S_C, target_S),
         "test_samples": len(rows),
@@ -176,26 +170,6 @@ def probability_metrics(rows: Frame) -> dict[str, float]:
         for area in AREAS:
             values[f"{area}_{score}"] = getattr(diagnostics, area)(-rows[score].to_numpy(), wrong_S)
     return values
-
-
-def bootstrap_bounds(rows: Frame, *axes: object) -> dict[str, float]:
-    """Bounds ``…_low`` and ``…_high`` of 95 % of `RESAMPLES` draws of one seed's samples, the same for all learners."""
-    p_S_C, target_S = predicted.probabilities(rows)
-    statistics: dict[str, tuple] = {
-        "ece": (diagnostics.calibration_error, p_S_C, target_S),
-        "nll": (diagnostics.negative_log_likelihood, p_S_C, target_S),
-        "brier": (diagnostics.brier_score, p_S_C, target_S),
-    }
-    for score in [name for name in predicted.scores_of(rows) if name in ("max_score", "bald")]:
-        statistics[f"aurc_{score}"] = (diagnostics.aurc, -rows[score].to_numpy(), predicted.wrong(rows))
-        name = f"rho_{score}_{DISTANCES[0]}"
-        statistics[name] = (diagnostics.rank_correlation, rows[score].to_numpy(), rows[DISTANCES[0]].to_numpy())
-    bounds: dict[str, float] = {}
-    for name, (statistic, *samples) in statistics.items():
-        random = generator(*axes, "bootstrap")
-        low, high = diagnostics.bootstrap_interval(statistic, *samples, random=random, resamples=RESAMPLES)
-        bounds |= {f"{name}_low": low, f"{name}_high": high}
-    return bounds
 
 
 def clusters_of(rows: Frame) -> list[str]:

@@ -11,7 +11,7 @@ from typing import Any
 
 from gpca.process.registry import load
 
-SUFFIXES = {"tables": ("md", "csv", "tex", "json"), "figures": ("png", "pdf")}  # the files of each kind
+SUFFIXES = {"tables": ("md", "csv", "json"), "figures": ("png", "pdf")}  # the files of each kind
 Names = Mapping[str, Any]  # what stands in braces -> its one value, or the list of its values
 
 

@@ -55,13 +55,6 @@ def interval_of(rows: Frame, column: Show) -> Cell | None:
     return interval_cell(chosen.iloc[0], factor=column.factor) if len(chosen) else None
 
 
-def mean_over_seeds(rows: Frame, column: Show) -> Cell | None:
-    """Cell of numbers by seed: the mean of each seed's mean; of as many test samples as the rows count in all."""
-    values_R = column.factor * where(rows, column.where).groupby("seed")["value"].mean()
-    samples = int(where(rows, {"metric": "test_samples"})["value"].sum())
-    return cell_of_repeats(values_R.to_numpy(), samples)
-
-
 class Sheet(TableBuilder):
     """A table that is being made; an InputError says that it has no row.
 

@@ -156,7 +156,7 @@ def test_stand_ins_are_said_in_title_and_row(metrics):
     for make, *costs in TABLES:
         table = made(make, metrics, *costs, sources=STAND_INS)
         assert "on procedural stand-ins" in table.caption
-        assert "LINEMOD (procedural stand-in)" in table.latex()
+        assert "LINEMOD (procedural stand-in)" in table.markdown()
         mixed = made(make, metrics, *costs, sources=STAND_INS | {"ycb": REAL["ycb"]})
         assert "partly on procedural stand-ins" in mixed.caption
         assert "| YCB |" in mixed.markdown()
@@ -207,34 +207,6 @@ def test_ties_at_the_printed_precision_are_all_bold_unless_most_of_a_large_group
     assert replace(table, compared=([key for key in cells if key[0] > 1],)).best() == {
         (row, "a") for row in range(2, 7)
     }
-
-
-def test_latex_needs_no_letters_that_it_lacks_and_has_minus_signs():
-    from gpca.reporting.tables.table import _tex
-
-    words = _tex("ρ ± σ: -12.5 ± 3 (95 %), Matérn 3/2, k-means_2, point-to-plane, 5°, -- none")
-    assert words.isascii()
-    assert words == (
-        r"$\rho$ $\pm$ $\sigma$: $-$12.5 $\pm$ 3 (95 \%), Mat\'ern 3/2, k-means\_2, point-to-plane, 5$^\circ$, -- none"
-    )
-
-
-def test_latex_is_balanced_escaped_and_as_wide_as_it_must_be(metrics):
-    sources = {"linemod": {"title": r"A_1 & 50 % ~ \x {b}", "stand_in": False}}
-    latex = made(table1_single_baselines, metrics, sources=sources).latex()
-    title = r"A\_1 \& 50 \% \textasciitilde{} \textbackslash{}x \{b\}"
-    assert rf"{title} & 30.0 (27.0 to 32.0) & \textbf{{97.0 (94.0 to 99.0)}} \\" in latex
-    for environment in ("table*", "tabular"):
-        assert latex.count(rf"\begin{{{environment}}}") == latex.count(rf"\end{{{environment}}}") == 1
-    assert latex.count(r"\toprule") == latex.count(r"\midrule") == latex.count(r"\bottomrule") == 1
-    assert latex.replace(r"\{", "").replace(r"\}", "").count("{") == latex.replace(r"\{", "").replace(r"\}", "").count(
-        "}"
-    )
-    assert latex.isascii()
-    rows = [line for line in latex.splitlines() if line.endswith(r"\\")]
-    assert {line.replace(r"\&", "").count("&") for line in rows} == {2}
-    assert r"\begin{table}[t]" in made(table1_single_baselines, metrics, explainers=["gpca"]).latex()
-    assert r"\begin{table*}[t]" in made(table1_single_baselines, metrics, sources=STAND_INS).latex()
 
 
 def test_metrics_without_these_explainers_are_refused(metrics):
@@ -321,11 +293,3 @@ def test_extended_sets_the_best_rival_in_bold_never_an_oracle_and_has_a_line_per
     assert ("ycb", "shap_additive", "further runs", "causal_accuracy", 50.0, 47.0, 52.0, 3, 63, False) in records
     assert ("ycb", "shap_additive", "further runs", "accuracy", 35.0, 32.0, 37.0, 3, 180, False) in records
     assert ("ycb", "gpca", "aligned source", "icp_calls", 0.0, 0.0, 0.0, 3, 600, False) in records
-
-
-def test_a_table_that_may_be_wider_than_the_text_is_scaled_down_in_latex(everything):
-    wide = made(table1_extended, *everything, sources=STAND_INS).latex()
-    assert r"\usepackage{booktabs, graphicx}" in wide.splitlines()[0]
-    assert wide.count(r"\resizebox") == wide.count(r"\end{tabular}}") == 1
-    assert wide.count("{") == wide.count("}")
-    assert "resizebox" not in made(table1_single_baselines, everything[0]).latex()

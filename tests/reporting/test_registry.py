@@ -58,7 +58,7 @@ def test_files_are_listed_where_a_name_is_a_list_and_one_path_where_it_is_not():
     }
     assert result(given("metrics.csv")).files(NAMES) == {"metrics": "metrics.csv"}
     assert result(given("recovery/policy_seed{first_seed}.json")).files(NAMES)["metrics"].endswith("seed0.json")
-    assert result().all_files == [f"tables/table9_mine.{suffix}" for suffix in ("md", "csv", "tex", "json")]
+    assert result().all_files == [f"tables/table9_mine.{suffix}" for suffix in ("md", "csv", "json")]
     assert result(kind="figures", name="fig").all_files == ["figures/fig.png", "figures/fig.pdf"]
     assert result().main_file == "tables/table9_mine.md"
 

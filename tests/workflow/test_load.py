@@ -76,7 +76,7 @@ def test_every_config_loads_offline_and_asks_for_all_results(project, planned, t
         for explainer in names["explainer"]
         for seed in names["seed"]
     }
-    asked |= {"comparison.csv", "tables/claims.tex", "index.html"}
+    asked |= {"comparison.csv", "tables/claims.csv", "index.html"}
     assert {f"results/{config}/{path}" for path in asked} <= planned.outputs
     assert all(path.startswith(f"results/{config}/") for path in planned.outputs)
     assert ("render_scenes" in planned.jobs) == (config in ("smoke", "stand_ins"))

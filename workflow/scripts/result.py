@@ -1,4 +1,4 @@
-"""Files of a run -> a table of the registry as CSV, Markdown, LaTeX and JSON, or a figure as PDF and PNG."""
+"""Files of a run -> a table of the registry as CSV, Markdown and JSON, or a figure as PDF and PNG."""
 
 from pathlib import Path
 

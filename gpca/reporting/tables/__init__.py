@@ -1,1 +1,1 @@
-"""Makes the tables and writes them as CSV, Markdown and LaTeX."""
+"""Makes the tables and writes them as CSV, Markdown and JSON."""

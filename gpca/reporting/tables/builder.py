@@ -8,7 +8,7 @@ from gpca.evaluation.intervals import REPEATS
 from gpca.objects.entry import stand_in_clause
 from gpca.reporting.tables.cells import share_within_limits
 from gpca.reporting.tables.table import LEAST_SEEDS, Cell, Column, Table
-from gpca.reporting.words import plural, span
+from gpca.reporting.words import plural
 
 INTERVAL = "± is the half-width of the 95 % t-interval over the seeds"
 NEAR_LIMITS = (
@@ -66,11 +66,6 @@ class TableBuilder:
         """Return over how many seeds the cell with the most of them is a mean."""
         self.require_rows()
         return max(cell.seeds for cell in self.cells.values())
-
-    def span_of_seeds(self) -> str:
-        """Return over how many seeds its cells are means, such as ``5`` or ``1 to 3``."""
-        self.require_rows()
-        return span(cell.seeds for cell in self.cells.values())
 
     def build(self, caption: str, column_head: str, columns: Mapping[str, Column], footnotes: Iterable[str]) -> Table:
         """Return the table with its columns, which may depend on the cells that there are."""

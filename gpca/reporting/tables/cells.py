@@ -81,12 +81,6 @@ def _farther_bounds(cell: Cell, trials: int) -> tuple[float, float]:
     return max(least, min(cell.mean - half_width, low)), min(most, max(cell.mean + half_width, high))
 
 
-def clustered_cell(intervals: pd.DataFrame, factor: float = 100, **wanted: object) -> Cell | None:
-    """Return the cell of the one row of intervals (:mod:`gpca.evaluation.measures`) with these entries, if any."""
-    rows = where(intervals, wanted)
-    return interval_cell(rows.iloc[0], factor=factor) if len(rows) else None
-
-
 def interval_cell(row: pd.Series, value: str = "value", bounds: Sequence[str] = ("low", "high"), factor: float = 100):
     """Return the cell of a row that has its interval in two columns of it, and ``seeds`` and ``samples``."""
     low, high = (factor * row[name] for name in bounds)

@@ -1,4 +1,4 @@
-"""Writes a table as CSV for machines, Markdown for readers, LaTeX for the paper and JSON for the page.
+"""Writes a table as CSV for machines, Markdown for readers and JSON for the page.
 
 Readers get pooled rows, the best first and trivial ones last, if the whole does not fit a page.
 """
@@ -7,7 +7,7 @@ import csv
 import json
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -23,8 +23,6 @@ LEAST_SEEDS = 3  # A mean over fewer has no interval: that of two spans everythi
 SHARE = (0.0, 100.0)  # limits of a share in percent
 MOST_COLUMNS, MOST_ROWS = 6, 15  # of a table for readers
 SIGHT, PAPERS = "reads", "gpca"  # label of what an explainer sees, for which there is no space; a row that always stays
-_COLUMN_CHARACTERS, _TEXT_CHARACTERS = 50, 100  # fill one column of a two-column paper, and both
-_SCALED_DOWN = r"\resizebox{\ifdim\width>\textwidth\textwidth\else\width\fi}{!}{%"
 
 
 @dataclass(frozen=True)
@@ -101,7 +99,7 @@ class Table:
         return best
 
     def write(self, stem: str | Path) -> None:
-        """Write ``{stem}.csv``, ``.md``, ``.tex`` and, for the page, ``.json``: each whole or not at all.
+        """Write ``{stem}.csv``, ``.md`` and, for the page, ``.json``: each whole or not at all.
 
         Markdown has the part that readers need (:func:`short`), JSON both.
         """
@@ -109,7 +107,7 @@ class Table:
         words = left_out(self, part)
         both = self.printed() | ({"short": part.printed() | {"left_out": words}} if words else {})
         page = json.dumps(both, indent=1, ensure_ascii=False) + "\n"
-        for suffix, text in (("md", part.markdown(words)), ("tex", self.latex()), ("json", page)):
+        for suffix, text in (("md", part.markdown(words)), ("json", page)):
             write_text(f"{stem}.{suffix}", text)
         with whole_file(f"{stem}.csv") as partial, partial.open("w", newline="", encoding="utf-8") as file:
             csv.writer(file, lineterminator="\n").writerows(self.records())
@@ -162,44 +160,13 @@ class Table:
         """Return a GitHub table, caption above, footnotes below, first `note`."""
         printed = self.printed()
         rule = [":--" if number < len(self.row_heads) else "--:" for number in range(len(printed["heads"]))]
-        body = _body(printed, lambda text: text.replace("|", "\\|"), "**{}**")
+        body = [
+            [f"**{text}**" if bold else text for text, bold in ((text.replace("|", "\\|"), bold) for text, bold in row)]
+            for row in printed["rows"]
+        ]
         table = "\n".join(f"| {' | '.join(row)} |" for row in (printed["heads"], rule, *body))
         notes = [note, *self.footnotes] if note else self.footnotes
         return "\n\n".join([f"**{self.numbered_caption}**", table, *notes]) + "\n"
-
-    def latex(self) -> str:
-        r"""Return a floating table; it needs ``\usepackage{booktabs}`` and spans both columns when it is wide.
-
-        A table that may be wider than the text is scaled down to it, which needs ``graphicx`` too.
-        """
-        printed = self.printed()
-        columns = zip(printed["heads"], *_body(printed, str, "{}"), strict=True)
-        characters = sum(2 + max(map(len, column)) for column in columns)
-        float_name = "table" if characters <= _COLUMN_CHARACTERS else "table*"
-        alignments = "l" * len(self.row_heads) + "c" * (len(printed["heads"]) - len(self.row_heads))
-        begin, end, packages = rf"\begin{{tabular}}{{{alignments}}}", r"\end{tabular}", "booktabs"
-        if characters > _TEXT_CHARACTERS:
-            begin, end, packages = f"{_SCALED_DOWN}\n{begin}", end + "}", "booktabs, graphicx"
-        return "\n".join(
-            [
-                rf"% needs \usepackage{{{packages}}}",
-                rf"\begin{{{float_name}}}[t]",
-                r"\centering",
-                rf"\caption{{{_tex(self.caption)}}}",
-                rf"\label{{tab:{self.name}}}",
-                r"\small",
-                begin,
-                r"\toprule",
-                " & ".join(r"\textbf{" + _tex(title) + "}" for title in printed["heads"]) + r" \\",
-                r"\midrule",
-                *(" & ".join(row) + r" \\" for row in _body(printed, _tex, r"\textbf{{{}}}")),
-                r"\bottomrule",
-                end,
-                *(rf"\par\smallskip{{\footnotesize {_tex(footnote)}}}" for footnote in self.footnotes),
-                rf"\end{{{float_name}}}",
-                "",
-            ]
-        )
 
 
 def short(table: Table) -> Table:
@@ -280,29 +247,3 @@ def _roman(number: int) -> str:
     """Return a number below 40 as the paper writes those of its tables."""
     tens, ones = divmod(number, 10)
     return "X" * tens + ("", "I", "II", "III", "IV", "V", "VI", "VII", "VIII", "IX")[ones]
-
-
-def _body(printed: Mapping[str, Any], escape: Callable[[str], str], bold: str) -> list[list[str]]:
-    """Return the rows of a table as printed, in a markup."""
-    return [[bold.format(escape(text)) if b else escape(text) for text, b in row] for row in printed["rows"]]
-
-
-_TEX = {
-    "\\": r"\textbackslash{}",
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-    "±": r"$\pm$",
-    "×": r"$\times$",
-    "–": "--",
-    "ρ": r"$\rho$",
-    "σ": r"$\sigma$",
-    "°": r"$^\circ$",
-    "é": r"\'e",
-    "<": r"\textless{}",
-    ">": r"\textgreater{}",
-} | {sign: "\\" + sign for sign in "&%$#_{}"}
-
-
-def _tex(text: str) -> str:
-    """Escape the characters special to LaTeX; a hyphen before a number is a minus."""
-    return re.sub(r"(?<![\w-])-(?=\d)", "$-$", "".join(_TEX.get(sign, sign) for sign in text))

@@ -77,7 +77,7 @@ def test_comparisons_add_up(builder):
     assert len(built(builder).compared) == 1 + 5
 
 
-@pytest.mark.parametrize("use", [TableBuilder.most_seeds, TableBuilder.span_of_seeds, built])
+@pytest.mark.parametrize("use", [TableBuilder.most_seeds, built])
 def test_a_table_without_rows_is_refused_by_its_name(use):
     with pytest.raises(InputError, match=r"^table 'table0': has nothing to show"):
         use(TableBuilder("table0", HEADS))
@@ -157,8 +157,6 @@ def test_the_footnote_counts_seeds_and_samples(seeds, samples, words):
 
 
 def test_the_seeds_and_samples_of_cells_are_told_as_a_span(builder):
-    assert builder.span_of_seeds() == "3"
     builder.add_row(labels("cups", "gpca"), {"a": plain_cell(1, 5, 10), "b": plain_cell(1, 2, 10)})
-    assert builder.span_of_seeds() == "2 to 5"
     assert builder.most_seeds() == 5
     assert (span([7.0, 7.0]), span([60, 15, 30])) == ("7", "15 to 60")

@@ -7,7 +7,7 @@ import pytest
 
 from gpca.evaluation.intervals import mean_interval, wilson_interval
 from gpca.evaluation.measures import COLUMNS
-from gpca.reporting.tables.cells import cautious_cell, cell_of_repeats, clustered_cell, share_within_limits
+from gpca.reporting.tables.cells import cautious_cell, cell_of_repeats, interval_cell, share_within_limits
 from gpca.reporting.tables.table import Column
 
 INTERVALS = pd.DataFrame(
@@ -20,11 +20,10 @@ INTERVALS = pd.DataFrame(
 
 
 def test_a_cell_has_the_interval_of_its_row():
-    cell = clustered_cell(INTERVALS, method="gpca", metric="accuracy")
+    cell = interval_cell(INTERVALS.iloc[0])
     assert (cell.mean, cell.seeds, cell.test_samples) == (95, 3, 180)
     assert Column("A").text(cell) == "95.0 (90.0 to 98.0)"
-    assert clustered_cell(INTERVALS, method="gpca", metric="nll") is None
-    without = clustered_cell(INTERVALS, 1, metric="ece")
+    without = interval_cell(INTERVALS.iloc[1], factor=1)
     assert Column("ECE", decimals=3).text(without) == "0.050"
 
 
