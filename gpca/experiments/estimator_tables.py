@@ -15,6 +15,7 @@ from gpca.reporting.tables.cells import interval_cell, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column
 from gpca.reporting.words import plural
 from gpca.uncertainty.estimates import KINDS
+from gpca.uncertainty.estimators.registry import estimator_entry
 
 SECTION = "Beyond the paper: how uncertain a pose is"
 INTERVALS = {"intervals": (estimators.read_intervals, "estimator_intervals.csv")}
@@ -57,20 +58,19 @@ def _count(values: Frame, metric: str) -> Cell | None:
     """What each estimator says about the same registrations, judged by what it models. A reference is a set of further
     registrations of the same situation: from other starts, of other data (the surfaces sampled again, with other
     noise and other outliers), or both. The paper uses Monte-Carlo over the starts alone. Registrations that failed
-    stand apart. Learners are also trained on another dataset and with mild severities.""",
+    stand apart.""",
     **INTERVALS,
 )
 def table12_uncertainty(run: Run, intervals):
     heads = {"method": "Registered by", "state": "State", "estimator": "Estimator", "models": "Models"}
-    methods, entries = _methods(run), estimators.estimates(run.config, run.sources)
-    titles = {name: entry["title"] for name, entry in entries.items()}
+    methods, titles = _methods(run), run.titles(estimator_entry, run.config["estimators"])
     states = {estimators.SUCCEEDED: "Succeeded", estimators.FAILED: "Failed"}
     rows = crossed(("method", methods), ("state", states), ("estimator", titles))
-    rows = with_label(rows, lambda row: entries[row.where["estimator"]]["models"])
+    rows = with_label(rows, lambda row: estimator_entry(row.where["estimator"]).models)
     columns = {"samples": Column("n", 0, **RATIO), **BY_MODEL, **BY_TRUTH}
 
     def cells(row: Row, subset: Frame) -> dict[str, Cell | None]:
-        reference = REFERENCE_OF[entries[row.where["estimator"]]["models"]]
+        reference = REFERENCE_OF[estimator_entry(row.where["estimator"]).models]
         by_reference = {metric: _cell(subset, f"{metric}_{reference}") for metric in BY_MODEL}
         samples = {"samples": _count(subset, f"coverage_{estimators.TRUTH}")}
         return by_reference | {metric: _cell(subset, metric) for metric in BY_TRUTH} | samples
@@ -114,14 +114,11 @@ def table12_references(run: Run, intervals):
         columns[f"kl_rotation_{kind}"] = Column(f"{REFERENCES[kind]}: KL, rotation", 1, interval=False, **KL)
         columns[f"coverage_{kind}"] = Column(f"{REFERENCES[kind]}: coverage (%)")
     columns[f"coverage_{estimators.TRUTH}"] = Column("True pose: coverage (%)")
-    references = {
-        f"reference_{kind}": {"title": f"Reference: {title.lower()}", "models": "–"}
-        for kind, title in REFERENCES.items()
-    }
-    entries = references | estimators.estimates(run.config, run.sources)
-    titles = {name: entry["title"] for name, entry in entries.items()}
+    references = {f"reference_{kind}": f"Reference: {title.lower()}" for kind, title in REFERENCES.items()}
+    models = dict.fromkeys(references, "–") | {name: estimator_entry(name).models for name in run.config["estimators"]}
+    titles = references | run.titles(estimator_entry, run.config["estimators"])
     rows = crossed(("method", _methods(run)), ("estimator", titles))
-    rows = with_label(rows, lambda row: entries[row.where["estimator"]]["models"])
+    rows = with_label(rows, lambda row: models[row.where["estimator"]])
     rows = [replace(row, rival=row.where["estimator"] not in references) for row in rows]
 
     def cells(row: Row, subset: Frame) -> dict[str, Cell | None]:
@@ -156,8 +153,7 @@ def table12_references(run: Run, intervals):
     seconds=(estimators.collect_estimate_seconds, "timings/{source}/estimator_{estimate}/seed{seed}.csv"),
 )
 def table12_failures(run: Run, intervals, seconds):
-    entries = estimators.estimates(run.config, run.sources)
-    titles = {name: entry["title"] for name, entry in entries.items()} | estimators.GATES
+    titles = run.titles(estimator_entry, run.config["estimators"]) | estimators.GATES
     methods = {}
     for method, title in _methods(run).items():
         counts = rows_where(intervals, method=method, metric="no_estimate").groupby("state")["samples"].max()

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
@@ -11,14 +11,14 @@ from gpca.causes.judged import ranking
 from gpca.declarations.experiment import ByName, Experiment, LeftOut, Names
 from gpca.declarations.plan import Run
 from gpca.declarations.result import Frame, Paths, Series, numbers
-from gpca.declarations.step import Plan, Step, Wildcards
+from gpca.declarations.step import Plan, Step
 from gpca.errors import InputError, with_key
 from gpca.evaluation.intervals import Clustered, interval
 from gpca.evaluation.measures import source_method_seed, tidy
 from gpca.io import csv_file
 from gpca.process.plugins import is_outside
 from gpca.settings import part_of
-from gpca.uncertainty.estimates import KINDS, MILD, OTHER_SOURCE, REFERENCES, EstimatorPairSettings, read_estimate_files
+from gpca.uncertainty.estimates import KINDS, REFERENCES, EstimatorPairSettings, read_estimate_files
 from gpca.uncertainty.estimators import registry
 
 
@@ -32,18 +32,6 @@ def check(config: dict, _left_out: LeftOut) -> None:
         with_key(f"estimator_pairs.methods.{name}", require_local, name)
 
 
-def estimates(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str, dict[str, str]]:
-    """All that have files of estimates, but for the references: which estimator each is, its title, what it models."""
-    shifts = {MILD: "trained on mild severities"}
-    shifts |= {OTHER_SOURCE: "trained on another dataset"} if len(sources) > 1 else {}
-    entries = {name: registry.estimator_entry(name) for name in config["estimators"]}
-    found = {name: {"by": name, "title": each.title, "models": each.models} for name, each in entries.items()}
-    for name, entry in entries.items():
-        for shift, words in shifts.items() if entry.learn else ():
-            found[f"{name}_{shift}"] = found[name] | {"title": f"{entry.title}, {words}"}
-    return found
-
-
 EXPERIMENT = Experiment(
     name="estimators",
     beside=("estimator_tables", "estimator_figure"),
@@ -53,7 +41,7 @@ EXPERIMENT = Experiment(
     },
     names=lambda config, sources: {
         "estimator": list(config["estimators"]),
-        "estimate": [*REFERENCES, *estimates(config, sources)],
+        "estimate": [*REFERENCES, *config["estimators"]],
     },
     check=check,
     optional_entries={
@@ -63,16 +51,9 @@ EXPERIMENT = Experiment(
 )
 
 
-def _other(plan: Plan, wildcards: Wildcards) -> list[str]:
-    """The source after that of a job, by which estimators are trained otherwise; none where it is the only one."""
-    sources = list(plan.sources)
-    return [sources[(sources.index(wildcards.source) + 1) % len(sources)]] if len(sources) > 1 else []
-
-
 def _asked(plan: Plan) -> list[str]:
     """Estimators whose estimates the jobs of a rule write."""
-    found = estimates(plan.config, plan.sources)
-    return list(dict.fromkeys(found[name]["by"] for name in plan.names["estimate"] if name in found))
+    return [name for name in plan.names["estimate"] if name not in REFERENCES]
 
 
 ESTIMATE = Step(
@@ -81,36 +62,24 @@ ESTIMATE = Step(
     inputs={
         "objects": "objects/{source}.npz",
         "causes": "causes/{source}/seed{*seed}.npz",
-        "other_objects": lambda plan, wildcards: [f"objects/{name}.npz" for name in _other(plan, wildcards)],
-        "other_causes": lambda plan, wildcards: [
-            f"causes/{name}/seed{{*seed}}.npz" for name in _other(plan, wildcards)
-        ],
     },
     outputs={
         "rows": "estimates/{source}/{*estimate}/seed{*seed}.csv",
         "timings": "timings/{source}/estimator_{*estimate}/seed{*seed}.csv",
-        "samples": "reference_samples/{source}/seed{*seed}.npz",
     },
     settings=lambda plan, _wildcards: {
         **{name: plan.config[name] for name in ("estimator_pairs", "causes", "success")},
         "icp": plan.config["registrations"]["icp"],
         "estimators": {name: plan.config["estimators"][name] for name in _asked(plan)},
     },
-    params={
-        "other": lambda plan, wildcards: "".join(_other(plan, wildcards)),
-        "estimators": lambda plan, _wildcards: _asked(plan),
-    },
+    params={"estimators": lambda plan, _wildcards: _asked(plan)},
     modules=lambda plan: [
         *map(registry.estimator_module, _asked(plan)),
         *map(method_module, plan.config["estimator_pairs"]["methods"]),
     ],
     apart=(
         "estimate",
-        lambda plan: [
-            name
-            for name, entry in estimates(plan.config, plan.sources).items()
-            if is_outside(registry.estimator_module(entry["by"]))
-        ],
+        lambda plan: [name for name in plan.config["estimators"] if is_outside(registry.estimator_module(name))],
     ),
     target="estimates",
     priority=2,

@@ -2,14 +2,12 @@
 
 The registrations are test samples of the causes' track: objects that no training sample shows, and failures of every
 kind. They are held against references of three kinds (:mod:`gpca.steps.references`), and against the error of the
-pose. Estimators that learn are trained three times: with samples of the same source, with those of another source, and
-with the mild half of the own; the latter two show what a shift does to them.
+pose. Estimators that learn are trained with samples of the same source.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache, partial
-from pathlib import Path
+from functools import partial
 from time import perf_counter
 
 import numpy as np
@@ -32,7 +30,7 @@ from gpca.rigid import inverse, point_jacobians, transform
 from gpca.seeds import generator, seed_of
 from gpca.steps.references import Redraws, Reference, draw_twists
 from gpca.uncertainty import estimates
-from gpca.uncertainty.estimates import KINDS, EstimatorPairSettings, ReferenceSamples
+from gpca.uncertainty.estimates import KINDS, EstimatorPairSettings
 from gpca.uncertainty.estimators.examples import Moved, describe, example, true_twist
 from gpca.uncertainty.estimators.interface import CovarianceEstimate, Example, FailedEstimate, RegisteredPair
 from gpca.uncertainty.estimators.registry import estimator_entry, make_estimator
@@ -137,28 +135,19 @@ class DrawnCauses:
 
 
 def run(job: Job) -> None:
-    """Ask every estimator, seed by seed; those that learn also after examples of another source, if one is given."""
+    """Ask every estimator, seed by seed."""
     settings = EstimatorPairSettings(**job.section("estimator_pairs"), failed=job.section("success")["error"])
     drawn_by = CauseSettings.from_dict(job.section("causes"), job.section("icp"))
     estimators = job.by_name("estimators", job.estimators)
-    named = {job.source: job.objects} | ({job.other: job.files("other_objects")[0]} if job.get("other") else {})
-    objects = {source: ObjectClouds.load(path, source) for source, path in named.items()}
-    judges = {source: Judges(of, f"objects of {source}") for source, of in objects.items()}
-
-    def situations(source: str, seed: int, path: Path) -> DrawnCauses:
-        causes = Causes.load(path, (source, seed))
-        return DrawnCauses(source, seed, causes, drawn_by, objects[source], judges[source])
-
-    others, samples = (job.files("other_causes") if job.get("other") else []), job.get("samples", [])
+    objects = ObjectClouds.load(job.objects, job.source)
+    judges = Judges(objects, f"objects of {job.source}")
     for i, (seed, path) in enumerate(job.per_seed("causes")):
         of_seed = slice(i, None, len(job.seeds))
-        out, timings, sampled = job.rows[of_seed], job.timings[of_seed], samples[i : i + 1]
-        inputs = [*named.values(), path, *others[i : i + 1]]
-        with record_provenance([*out, *timings, *sampled], inputs, job.settings, seed=seed):
-            other = situations(job.other, seed, others[i]) if others else None
-            rows, cases = try_estimators(situations(job.source, seed, path), other, estimators, settings)
-            for file in sampled:
-                reference_samples(cases).save(file, (job.source, seed))
+        out, timings = job.rows[of_seed], job.timings[of_seed]
+        with record_provenance([*out, *timings], [job.objects, path], job.settings, seed=seed):
+            causes = Causes.load(path, (job.source, seed))
+            situations = DrawnCauses(job.source, seed, causes, drawn_by, objects, judges)
+            rows, _ = try_estimators(situations, estimators, settings)
             for name, own_out, own_timings in zip(job.estimates, out, timings, strict=True):
                 write_csv(own_out, rows[name].drop(columns="seconds"))
                 write_csv(own_timings, rows[name][["sample", "method", "seconds"]])
@@ -166,39 +155,25 @@ def run(job: Job) -> None:
 
 def try_estimators(
     situations: DrawnCauses,
-    other: DrawnCauses | None,
     estimators: Mapping[str, Mapping],
     settings: EstimatorPairSettings,
 ) -> tuple[dict[str, Frame], list[EstimatedRow]]:
     """Rows, one per registration, of each reference and estimator by name; and the registrations.
 
-    Rows have the seconds of an estimate, with those of the descriptors that it reads, without those of learning. Those
-    that are trained otherwise have rows of the method with the most registrations alone.
+    Rows have the seconds of an estimate, with those of the descriptors that it reads, without those of learning.
     """
     import pandas as pd
 
     records: dict[str, list[dict]] = {}
     cases = []
-    learners = [name for name in estimators if estimator_entry(name).learn]
+    learns = any(estimator_entry(name).learn for name in estimators)
     tested = situations.causes.rows("test")
     if not len(tested):
         raise InputError(f"causes of {situations.source}", "have no test samples", "raise causes.test")
     for method, wanted in settings.methods.items():
-        train = situations.causes.rows("train")
-        training_sets = {"": (situations, train)}
-        if method == most_tested(settings):
-            training_sets[f"_{estimates.MILD}"] = situations, mild(situations, train)
-            if other is not None:
-                training_sets[f"_{estimates.OTHER_SOURCE}"] = other, other.causes.rows("train")
-        example_of = cache(partial(DrawnCauses.example, method=method, settings=settings))  # sets share rows
-        examples = {
-            shift: [example_of(taken_from, row) for row in spaced(rows, settings.train)] if learners else []
-            for shift, (taken_from, rows) in training_sets.items()
-        }
-        trained = {name: make_estimator(name, entry, examples[""]) for name, entry in estimators.items()}
-        for name in learners:
-            for shift in list(training_sets)[1:]:
-                trained[f"{name}{shift}"] = make_estimator(name, estimators[name], examples[shift])
+        train = spaced(situations.causes.rows("train"), settings.train if learns else 0)
+        examples = [situations.example(row, method, settings) for row in train]
+        trained = {name: make_estimator(name, entry, examples) for name, entry in estimators.items()}
         for row in progress(
             spaced(tested, wanted), f"estimators on {situations.source}, seed {situations.seed}, {method}"
         ):
@@ -217,39 +192,9 @@ def try_estimators(
     return {name: pd.DataFrame(of_estimator) for name, of_estimator in records.items()}, cases
 
 
-def most_tested(settings: EstimatorPairSettings) -> str:
-    """The method with the most registrations; of equals the first by name, as files keep no order of them."""
-    return min(settings.methods, key=lambda method: (-settings.methods[method], method))
-
-
-def mild(situations: DrawnCauses, rows: np.ndarray) -> np.ndarray:
-    """The half of the rows, in their order, whose strongest perturbation is weakest, in its range's maximum."""
-    registrations, ranges = situations.causes.registrations, situations.drawn_by.severities
-    strengths = [
-        registrations.severity_noise[rows] / ranges.noise[1],
-        registrations.severity_rotation_rad[rows] / np.deg2rad(ranges.rotation_deg[1]),
-        registrations.severity_translation[rows] / ranges.translation[1],
-        registrations.severity_crop[rows] / ranges.crop[1],
-    ]
-    return rows[np.sort(np.argsort(np.max(strengths, axis=0), kind="stable")[: (len(rows) + 1) // 2])]
-
-
 def spaced(rows: np.ndarray, wanted: int) -> np.ndarray:
     """So many of the rows, evenly spaced: states that are rare come last."""
     return rows[np.unique(np.linspace(0, len(rows) - 1, min(wanted, len(rows))).round().astype(int))]
-
-
-def reference_samples(cases: Sequence[EstimatedRow]) -> ReferenceSamples:
-    """The references' results for these registrations, as their file holds them."""
-    each = [(case, kind, case.references[kind].twists) for case in cases for kind in KINDS]
-    return ReferenceSamples(
-        sample=np.array([case.columns["sample"] for case, _, _ in each]),
-        method=np.array([case.columns["method"] for case, _, _ in each]),
-        kind=np.array([kind for _, kind, _ in each]),
-        twists=np.concatenate([twists for *_, twists in each]).astype(np.float32),
-        offsets=np.cumsum([0, *(len(twists) for *_, twists in each)], dtype=np.int64),
-        true_twist=np.array([case.true_twist for case, _, _ in each]),
-    )
 
 
 def judged(case: EstimatedRow, answer: CovarianceEstimate, floor: float) -> dict[str, object]:

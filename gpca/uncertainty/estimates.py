@@ -8,8 +8,6 @@ from typing import Annotated, Literal, get_args
 import numpy as np
 
 from gpca.evaluation.measures import source_method_seed
-from gpca.io.arrays import TEXT, WHOLE
-from gpca.io.container import Container, array
 from gpca.io.csv_file import numbers, read_csv
 from gpca.io.frame import Frame
 from gpca.settings import Bounds, PositiveShare
@@ -17,7 +15,6 @@ from gpca.settings import Bounds, PositiveShare
 Kind = Literal["starts", "data", "all"]  # of a reference: what varies in it
 KINDS: tuple[Kind, ...] = get_args(Kind)
 REFERENCES = tuple(f"reference_{kind}" for kind in KINDS)  # by these names they have rows among the estimators
-OTHER_SOURCE, MILD = "other_source", "mild"  # what a learner is trained with, for its name
 SIXTH = np.triu_indices(6)
 # Upper triangle of Σ, row by row, in squared milliradians and thousandths of the diameter.
 COVARIANCE = tuple(f"covariance_{i + 1}{j + 1}" for i, j in zip(*SIXTH, strict=True))
@@ -75,21 +72,3 @@ def read_estimates(path: str | Path) -> Frame:
 def read_estimate_files(files: Iterable[str | Path]) -> dict[tuple[str, str, int], Frame]:
     """Rows of files named ``…/{source}/{estimator}/seed{seed}.csv`` by these three."""
     return {source_method_seed(path): read_estimates(path) for path in files}
-
-
-@dataclass(frozen=True)
-class ReferenceSamples(Container):
-    """The results of references for registrations, S in all, as twists about the pose, in radians and diameters.
-
-    Attributes:
-        sample, method, kind: (S,) which registration, and which reference.
-        twists: (ΣN, 6) float32, those of registration i are ``twists[offsets[i]:offsets[i + 1]]``.
-        true_twist: (S, 6) of the true pose.
-    """
-
-    sample: np.ndarray = array("S", WHOLE)
-    method: np.ndarray = array("S", TEXT)
-    kind: np.ndarray = array("S", TEXT)
-    twists: np.ndarray = array("N 6", offsets="offsets", fewest=0)
-    offsets: np.ndarray = array("S+1", WHOLE)
-    true_twist: np.ndarray = array("S 6")

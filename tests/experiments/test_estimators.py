@@ -9,7 +9,7 @@ from gpca.errors import InputError
 from gpca.experiments import estimators
 from gpca.experiments.estimators import TRUTH, collect_estimate_seconds, measure, read_intervals, trimmed_mean
 from gpca.io.csv_file import write_csv
-from gpca.uncertainty.estimates import JUDGED, KINDS, REFERENCES, ReferenceSamples, covariance_columns, read_estimates
+from gpca.uncertainty.estimates import JUDGED, KINDS, REFERENCES, covariance_columns, read_estimates
 
 from ..steps.test_estimates import covariance_of
 from .runs import run_with
@@ -189,14 +189,3 @@ def test_seconds_are_medians_over_all_files(file):
 def test_a_faulty_file_is_one_line(file, changes, message):
     with pytest.raises(InputError, match=message):
         read_estimates(file(rows(**changes)))
-
-
-def test_samples_survive_the_file(tmp_path):
-    samples = ReferenceSamples(
-        np.array([4, 5]), np.array(["gicp", "gicp"]), np.array(["data", "all"]), np.ones((5, 6), np.float32),
-        np.array([0, 3, 5]), np.zeros((2, 6)),
-    )  # fmt: skip
-    samples.save(tmp_path / "a.npz", ("cups", 0))
-    loaded = ReferenceSamples.load(tmp_path / "a.npz")
-    assert loaded.part("twists", 1).shape == (2, 6)
-    assert loaded.kind.tolist() == ["data", "all"]

@@ -48,7 +48,7 @@ LISTS = {  # which names of a step are lists, and not of one seed, file or name
     "controls": "retrained retrained_embeddings others other_registrations",
     "diagnose": "seeds causes read read_timings predictions timings",
     "diagnose_by_features": "seeds causes descriptors predictions",
-    "estimate": "seeds estimators estimates causes other_objects other_causes samples rows timings",
+    "estimate": "seeds estimators estimates causes rows timings",
     "diagnose_frames": "causes descriptors reenactments encoders embeddings",
     "frame_labels": "backbones embeddings strategies out",
     "kernel_grid": "seeds registrations embeddings out predictions",

@@ -31,7 +31,7 @@ CAUSES = {  # of two symmetric objects with few points: only pose errors make th
 }  # fmt: skip
 REENACTED = {"reenactment": {"hypotheses": 2}, "causes": CAUSES, "icp": ICP}
 CONTROLS = {"controls": ["density", "shuffled", "transfer"], "draw_points": [32, 64]}
-ESTIMATES = ("reference_starts", "reference_data", "reference_all", "brossard", "cello", "cello_mild")
+ESTIMATES = ("reference_starts", "reference_data", "reference_all", "brossard", "cello")
 COMMON = {"--source": "tiny"}
 STEP_OPTIONS = {
     "objects": COMMON | {
@@ -70,7 +70,7 @@ STEP_OPTIONS = {
         },
         "--seeds": 0, "--estimators": ["brossard", "cello"], "--estimates": list(ESTIMATES),
         "--objects": "objects.npz", "--causes": "causes.npz",
-        "--samples": "reference_samples.npz", "--rows": [f"{name}_said.csv" for name in ESTIMATES],
+        "--rows": [f"{name}_said.csv" for name in ESTIMATES],
         "--timings": [f"{name}_seconds.csv" for name in ESTIMATES],
     },
     "train_on_causes": COMMON | {

@@ -48,7 +48,6 @@ def test_a_folder_of_meshes_and_a_rule_of_an_own_source_become_rows(finished, pl
         "learning_curve",
         "estimate",
         "estimator_",
-        "reference_samples",
     )
     assert not [path for path in of_others if not any(word in path for word in taught_by_others)]
     assert not again.jobs.keys() & {"fit_kernel_grid", "explain_exchanged", "recover", "render_scenes"}
