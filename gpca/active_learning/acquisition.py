@@ -198,6 +198,5 @@ STRATEGIES = {
 STREAMS = {
     "stream_random": "Stream, random",
     "stream_bald": "Stream, BALD over a threshold",
-    "stream_narr": "Stream, Mondrian forest (after Narr et al.)",
     "stream_clever": "Stream, Bayesian layer (after CLEVER)",
 }

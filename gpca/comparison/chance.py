@@ -1,9 +1,4 @@
-"""How many shuffled numbers would agree too: chance of the verdicts, and of the share of close numbers.
-
-Within each column of a table, values beside the wrong printed numbers may agree with them as often as beside the right
-ones; the counts of verdicts then carry no information about the rows. Joint readings are searched by the share of close
-numbers with equal weights of tables (docs/comparison.md); its chance is that of permuted printed numbers.
-"""
+"""How many shuffled numbers would agree too: chance of the verdicts, and of the share of close numbers."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence

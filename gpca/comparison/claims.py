@@ -1,9 +1,7 @@
 """The paper's claims in sentences (``claims.yaml``) and the verdict on each, from a run's differences.
 
 A difference is taken seed by seed, with Student's interval over the seeds. Shares of samples with stored predictions
-have a second interval, by the bootstrap over clusters and seeds with common draws; the outermost bounds count. "As good
-as" is supported by two one-sided tests: the whole interval lies within the margin. A difference on the claimed side
-that is smaller than the margin is no refutation, and has a verdict of its own.
+have a second interval, by the bootstrap over clusters and seeds with common draws; the outermost bounds count.
 """
 
 import math
@@ -105,7 +103,6 @@ def read_claims() -> list[Claim]:
 
 
 def counterparts_of(claims: Iterable[Claim]) -> list[Counterpart]:
-    """Return all values of a run that the claims compare."""
     return [counterpart for claim in claims for compared in claim.compared for counterpart in compared.counterparts]
 
 
@@ -121,11 +118,8 @@ def judge(
 
     A claim is supported if all of its comparisons are. It is refuted, or smaller than the margin, if one comparison is
     by a Bonferroni interval (level divided by the number of comparisons). Values that the run lacks are "not run", and
-    those of stand-ins "not comparable"; the other comparisons then decide.
-
-    Prediction files, named ``…/predictions/{source}/{method}/seed{seed}.csv``, are for claims about scores, draws of
-    clusters for those about shares of samples. Floors are the minimum by unit; a comparison is inconclusive where both
-    values are at it in at least half of the seeds.
+    those of stand-ins "not comparable"; the other comparisons then decide. Prediction files are for claims about
+    scores, draws of clusters for shares of samples. Floors are the minimum by unit.
     """
     import pandas as pd
 
@@ -185,10 +179,7 @@ def _name(value: Counterpart | float, compared: Compared) -> str:
 
 
 def verdict_of_interval(claim: Claim, low: float, high: float, may_rise: bool = False, may_fall: bool = False) -> str:
-    """Return whether a difference, of logarithms with `ratio`, with these bounds supports or refutes the claim.
-
-    A censored difference, which may rise or fall, leaves one of the answers open.
-    """
+    """Return the verdict by the bounds of a difference; a censored one may rise or fall, which leaves some open."""
     margin = math.log(claim.margin) if claim.ratio else claim.margin
     if claim.test == "less":
         low, high, may_rise, may_fall = -high, -low, may_fall, may_rise

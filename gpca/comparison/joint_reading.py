@@ -1,8 +1,7 @@
 """Joint readings: a value of every choice that touches several of the paper's tables, and which numbers they fit.
 
-A printed number depends only on the choices of its *part*. The values of a part form an array with an axis for every
-choice, of length 1 where they do not depend on it. The share of close numbers of every reading is a sum of these
-arrays, also for permuted printed numbers.
+A printed number depends only on the choices of its *part*, whose values form an array with an axis for every choice, of
+length 1 where they do not depend on it. Shares of close numbers are sums of these arrays.
 """
 
 import math

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Mapping
 
 from gpca.comparison.chance import ALL, SHUFFLES, chance
-from gpca.comparison.published import HARDWARE, TABLES, TEXT
+from gpca.comparison.published import HARDWARE, TEXT, TITLES
 from gpca.comparison.verdicts import DECIDED, PAPER_TOO_WIDE, VERDICTS, Tolerance, counts, judged_once
 from gpca.io.frame import Frame
 from gpca.objects.entry import STAND_IN
@@ -98,7 +98,7 @@ def _parts(comparison: Frame) -> tuple[Frame, Frame, Frame]:
 
 
 def _name(table: str) -> str:
-    return TABLES[table].title if table == TEXT else f"Table {table}: {TABLES[table].title}"
+    return TITLES[table] if table == TEXT else f"Table {table}: {TITLES[table]}"
 
 
 def _distinct(texts: Iterable[str]) -> list[str]:

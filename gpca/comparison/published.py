@@ -35,52 +35,15 @@ UNITS = {
     "share": Unit(1, most=1),
 }
 TIMES = ("s", "ms")
-_SOURCES = ("Coffee Cup", "LINEMOD", "YCB")
-_REDUCTIONS = ("No Reduction", "PCA", "UMAP", "AE")
-
-
-class PaperTable(NamedTuple):
-    """A table of the paper: its subject, rows and columns."""
-
-    title: str
-    rows: tuple[str, ...] = ()
-    columns: tuple[str, ...] = ()
-
-
-TABLES = {
-    "I": PaperTable("Single-concept attribution", _SOURCES, ("SHAP", "SA", "GP-CA")),
-    "II": PaperTable("Accuracy per concept", _SOURCES, ("Noise", "Pose", "Overlap")),
-    "III": PaperTable("Active learning", _SOURCES, ("#Labels BALD", "#Labels Random", "Acc.", "Epochs")),
-    "IV": PaperTable(
-        "Kernel and schedule",
-        (
-            "RBF, lr=.01, 100 iterations",
-            "Matérn 3/2, lr=.01, 200 iterations",
-            "Poly. p=2, lr=.01, 200 iterations",
-            "RBF, lr=.001, 200 iterations",
-            "Poly. p=2, lr=.001, 200 iterations",
-        ),
-        ("YCB", "LINEMOD"),
-    ),
-    "V": PaperTable("Learners", ("GPC", "RF", "Linear SVM"), ("CC", "LM", "YCB", "ρ", "AUC", "ECE")),
-    "VI": PaperTable(
-        "Backbones and reductions on depth frames",
-        tuple(f"{b}, {r}" for b in ("DGCNN", "PointNet", "PointNet++", "PointNeXt") for r in _REDUCTIONS),
-        ("Mean Acc.", "Std. Dev."),
-    ),
-    "VII": PaperTable(
-        "Runtime",
-        (
-            "ICP alignment",
-            "DGCNN feature extraction",
-            "GPC posterior sampling (1000 draws)",
-            "GP-CA score computation",
-            "BALD selection (optional)",
-            "GPC retraining (optional)",
-        ),
-        ("Time",),
-    ),
-    TEXT: PaperTable("In the text"),
+TITLES = {  # of the paper's tables, in words
+    "I": "Single-concept attribution",
+    "II": "Accuracy per concept",
+    "III": "Active learning",
+    "IV": "Kernel and schedule",
+    "V": "Learners",
+    "VI": "Backbones and reductions on depth frames",
+    "VII": "Runtime",
+    TEXT: "In the text",
 }
 
 

@@ -127,7 +127,8 @@ def _compared(file: str, here: Mapping[tuple, Mean], there: Mapping[tuple, Mean]
     for one, other, verb in ((there, here, "lacks"), (here, there, "adds to the reference")):
         if extra := [key for key in one if key not in other]:
             return DIFFERENT, f"{verb} {len(extra)} of {len(one)} values, such as {' / '.join(extra[0])}"
-    differences = {key: here[key].value - mean.value for key, mean in there.items() if not _same(here[key], mean)}
+    pairs = {key: (here[key].value, mean.value) for key, mean in there.items()}
+    differences = {key: x - y for key, (x, y) in pairs.items() if x != y and not (math.isnan(x) and math.isnan(y))}
     if not differences:
         return IDENTICAL, f"all {len(there)} values"
     limits = {key: allowance.limit(file, there[key]) for key in differences}
@@ -142,10 +143,6 @@ def _compared(file: str, here: Mapping[tuple, Mean], there: Mapping[tuple, Mean]
     counts = f"{len(differences)} of {len(there)} values differ"
     counts += f", {len(beyond)} by more than rounding explains" if beyond else ""
     return DIFFERENT if beyond else ROUNDING, f"{counts}; the worst, {' / '.join(worst)}: {largest}"
-
-
-def _same(one: Mean, other: Mean) -> bool:
-    return one.value == other.value or (math.isnan(one.value) and math.isnan(other.value))
 
 
 def device_of(folder: Path, file: str) -> str:

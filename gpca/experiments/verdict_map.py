@@ -4,7 +4,7 @@ import math
 from pathlib import Path
 from typing import NamedTuple
 
-from gpca.comparison.published import TABLES, TEXT
+from gpca.comparison.published import TEXT, TITLES
 from gpca.comparison.verdicts import (
     CLOSE,
     COMPARISON_COLUMNS,
@@ -114,7 +114,7 @@ def _blocks(table: str, once: Frame) -> list[Block]:
     if table == TEXT:
         named = {f"{row['row']}: {row['column']}": row for row in rows}
         parts = [[*named][start : start + MOST_ROWS] for start in range(0, len(named), MOST_ROWS)]
-        titles = [TABLES[TEXT].title] + [""] * len(parts)
+        titles = [TITLES[TEXT]] + [""] * len(parts)
         return [
             Block(title, part, [""], {(name, ""): named[name] for name in part})
             for title, part in zip(titles, parts, strict=False)

@@ -1,8 +1,6 @@
-"""Step ``estimate``: every estimator says how uncertain the same registrations are, and its answers are measured.
+"""Step ``estimate``: every estimator says how uncertain test registrations of the causes are, held against references.
 
-The registrations are test samples of the causes' track: objects that no training sample shows, and failures of every
-kind. They are held against references of three kinds (:mod:`gpca.steps.references`), and against the error of the
-pose. Estimators that learn are trained with samples of the same source.
+The references are of three kinds (:mod:`gpca.steps.references`), beside the error of the pose.
 """
 
 from collections.abc import Mapping
@@ -43,34 +41,22 @@ LEVEL = 0.95  # of the region whose coverage is counted
 
 @dataclass(frozen=True)
 class EstimatedRow:
-    """A test registration by one method.
+    """A test registration by one method."""
 
-    Attributes:
-        columns: those of every row about it: sample, object, method, errors.
-        registered: the input of an estimator.
-        true_twist: (6,) of the true pose about that of the registration, the symmetric one that is nearest.
-        references: by their kind.
-    """
-
-    columns: dict[str, object]
+    columns: dict[str, object]  # of every row about it: sample, object, method, errors
     registered: RegisteredPair
-    true_twist: np.ndarray
-    references: Mapping[str, Reference]
+    true_twist: np.ndarray  # (6,) of the true pose about that of the registration, the nearest of symmetric ones
+    references: Mapping[str, Reference]  # by kind
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnCauses:
-    """Registrations of one source and seed with measured causes, and what it takes to draw them again.
-
-    Attributes:
-        drawn_by: the settings that the causes were drawn with.
-        objects, judges: of the source.
-    """
+    """Registrations of one source and seed with measured causes, and what it takes to draw them again."""
 
     source: str
     seed: int
     causes: Causes
-    drawn_by: CauseSettings
+    drawn_by: CauseSettings  # settings that the causes were drawn with
     objects: ObjectClouds
     judges: Judges
 
@@ -102,7 +88,7 @@ class DrawnCauses:
         return EstimatedRow(columns, registered, true_twist(registered, T_true, judge, MOVED), references)
 
     def example(self, row: int, method: str, settings: EstimatorPairSettings) -> Example:
-        """A training registration with the results of a few registrations of other data from other starts."""
+        """Return a training registration with results of a few registrations of other data from other starts."""
         registered, T_true, redraws = self._registered(row, method, settings)
         judge, runs = self.judges.of(self.causes.registrations, row), settings.train_starts
         draw = partial(draw_twists, "all", registered, redraws, runs, *self._axes(method), "examples")
@@ -114,10 +100,10 @@ class DrawnCauses:
     def _registered(
         self, row: int, method: str, settings: EstimatorPairSettings
     ) -> tuple[RegisteredPair, np.ndarray, Redraws]:
-        """A registration of the model, the source, to the observed cloud; the true pose; what draws the clouds again.
+        """Register the model, the source, to the observed cloud, in the frame where the causes have put that.
 
-        The target's frame is the one in which the causes' track has put the observed cloud: near the model's. The true
-        pose takes what was observed there. Raises InputError where the row was drawn with other settings or objects.
+        Return also the true pose, which takes what was observed there, and what draws the clouds again; InputError
+        where the row was drawn with other settings or objects.
         """
         registrations = self.causes.registrations
         observed = observed_pair(self.causes, row, *self._axes(method))
@@ -158,10 +144,7 @@ def try_estimators(
     estimators: Mapping[str, Mapping],
     settings: EstimatorPairSettings,
 ) -> tuple[dict[str, Frame], list[EstimatedRow]]:
-    """Rows, one per registration, of each reference and estimator by name; and the registrations.
-
-    Rows have the seconds of an estimate, with those of the descriptors that it reads, without those of learning.
-    """
+    """Return the rows of each reference and estimator, one per registration, with seconds; and the registrations."""
     import pandas as pd
 
     records: dict[str, list[dict]] = {}
@@ -174,9 +157,8 @@ def try_estimators(
         train = spaced(situations.causes.rows("train"), settings.train if learns else 0)
         examples = [situations.example(row, method, settings) for row in train]
         trained = {name: make_estimator(name, entry, examples) for name, entry in estimators.items()}
-        for row in progress(
-            spaced(tested, wanted), f"estimators on {situations.source}, seed {situations.seed}, {method}"
-        ):
+        title = f"estimators on {situations.source}, seed {situations.seed}, {method}"
+        for row in progress(spaced(tested, wanted), title):
             case = situations.case(row, method, settings)
             cases.append(case)
             for kind, reference in case.references.items():
@@ -212,13 +194,10 @@ def judged(case: EstimatedRow, answer: CovarianceEstimate, floor: float) -> dict
 
 
 def compared(sigma_6_6: np.ndarray, reference: Reference, floor: float) -> dict[str, float]:
-    """How a covariance fits the results of a reference about their mean, with their own covariance S.
+    """Return how a covariance Σ fits the results of a reference about their mean, which have the covariance S.
 
-    - kl_rotation, kl_translation: KL divergence of the 3×3 blocks, S the expected one, nats.
-    - error_ratio: tr S / tr Σ. mahalanobis: mean of dᵀΣ⁻¹d over the results' distances d from their mean, tr Σ⁻¹S.
-    - covered: share of the results within the 95 % region of Σ about their mean.
-
-    All with the floor added to both, so that a spread below it counts as none. Nothing where the reference has none.
+    KL divergences of the 3×3 blocks (nats), tr S / tr Σ, tr Σ⁻¹S, and the share of the results within the 95 % region
+    of Σ; the floor is added to both, so that a spread below it counts as none. Nothing where the reference has none.
     """
     from scipy.stats import chi2
 

@@ -1,10 +1,7 @@
 """References: what further registrations of the same situation find, by what varies between them.
 
-- ``starts``: the clouds stay; the method starts from other initial poses.
-- ``data``: the initial pose stays; the surfaces are sampled again, with other noise and other outliers.
-- ``all``: both.
-
-The situation stays: the object, where it is cut off, the severity of every cause and the pose error.
+The method begins at other initial poses (``starts``), surfaces are sampled again with other noise and outliers
+(``data``), or both (``all``); the object, where it is cut off, the severities and the pose error stay.
 """
 
 from collections.abc import Iterator
@@ -46,19 +43,12 @@ class Reference:
 
 @dataclass(frozen=True)
 class Redraws:
-    """Draws the clouds of a candidate again, with the same causes, severities and numbers of points.
-
-    Attributes:
-        candidate: what was registered.
-        surface: (N, 3) points of its object, of which model and observation take different ones.
-        T_target_observed: 4×4, from where the candidate has what it observed to the target's frame.
-        points: of source and of target, at most.
-    """
+    """Draws the clouds of a candidate again, with the same causes, severities and numbers of points."""
 
     candidate: Candidate
-    surface: np.ndarray
-    T_target_observed: np.ndarray
-    points: int
+    surface: np.ndarray  # (N, 3) points of its object, of which model and observation take different ones
+    T_target_observed: np.ndarray  # 4×4, from the candidate's frame
+    points: int  # of source and of target, at most
 
     def clouds(self, *axes: object) -> Clouds:
         """Yield the model as the source and what is observed as the target, without end, drawn by the axes."""
@@ -79,10 +69,7 @@ class Redraws:
 
 
 def draw_twists(kind: Kind, registered: RegisteredPair, redraws: Redraws, repeats: int, *axes: object) -> np.ndarray:
-    """Twists (n, 6) about the pose of the results of so many registrations, fewer where some are lost.
-
-    Raises FailedEstimate where too few found a correspondence.
-    """
+    """Return the results of so many registrations as twists (n, 6) about the pose; FailedEstimate for too few."""
     if kind == "starts":
         return sample(registered, repeats, *axes)
     axes = (*axes, kind, registered.pair.seed)

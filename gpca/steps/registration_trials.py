@@ -35,20 +35,13 @@ Points = Annotated[int, Bounds(minimum=64, maximum=65536)]
 
 @dataclass(frozen=True)
 class PairSettings:
-    """The pairs that every method registers.
+    """The pairs that every method registers."""
 
-    Attributes:
-        samples: test samples of each source and seed, balanced, at most.
-        points: of source and of target (fewer where a cloud has fewer).
-        global_start: the global method at whose pose local methods start a second time.
-        points_of: method -> its own number of points, where its authors use more than others do.
-        neighbors_of: method -> number of neighbors for its normals, where it is not the usual one.
-    """
-
-    samples: Annotated[int, Bounds(minimum=3, multipleOf=3)]
-    points: Points
-    global_start: str
-    points_of: dict[str, Points] = field(default_factory=dict)
+    samples: Annotated[int, Bounds(minimum=3, multipleOf=3)]  # test samples of each source and seed, balanced, at most
+    points: Points  # of source and of target, at most
+    global_start: str  # the global method at whose pose local methods start a second time
+    points_of: dict[str, Points] = field(default_factory=dict)  # of methods whose authors use more than others do
+    # Of methods: neighbors for normals, where not the usual number
     neighbors_of: dict[str, Annotated[int, Bounds(minimum=3, maximum=1000)]] = field(default_factory=dict)
 
 
@@ -74,10 +67,7 @@ def try_methods(
     methods: Mapping[str, Mapping],
     settings: PairSettings,
 ) -> dict[str, Frame]:
-    """Return for each method a row per pair and start, with the points that it had; see :func:`try_each`.
-
-    The same normals serve all methods of one number of points. Fewer points of a cloud are among more of it.
-    """
+    """Return for each method a row per pair and start, with the points that it had; see :func:`try_each`."""
     rows = np.flatnonzero((registrations.split == "test") & (registrations.sample < settings.samples)).tolist()
     if not rows:  # threes of one object, which go round the objects
         raise InputError(f"registrations of {source}", "have no test samples", "raise registrations.test")
@@ -127,15 +117,10 @@ def try_each(
     asked: Callable[[int, str], tuple[Pair, dict]],
     errors: Callable[[int, np.ndarray], dict],
 ) -> dict[str, Frame]:
-    """Rows of every sample by method: global methods run once, local ones again from the pose of the one named `start`.
+    """Return rows of every sample by method: local methods run again from the pose of the global one named `start`.
 
-    A method that fails has its reason in the row. Each method is called once before the first sample, so that no time
-    includes what a method loads or compiles. Raises InputError for an unknown method or setting, a missing package, or
-    a start, the section's ``global_start``, that is none or not among the methods.
-
-    Args:
-        asked: a sample and a method -> what it is given, and the first columns of its rows.
-        errors: a sample and a pose T_target_source (4×4) -> its errors.
+    Each method is called once before the first sample, so that no time includes what it loads or compiles. `asked`
+    gives what a method gets for a sample, and the first columns of its rows; `errors` those of a pose (4×4).
     """
     import pandas as pd
 

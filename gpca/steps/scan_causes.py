@@ -1,8 +1,7 @@
 """The steps of causes on scans: measured causes of registrations, and what explainers answer.
 
-An explainer has learned from objects and is asked unchanged, or from scans: of all scenes outside the fold that it is
-asked about. Encoders of the aligned source are those of objects in both cases: the classifier of their embeddings is
-what learns from scans.
+An explainer has learned from objects, or from scans of all scenes outside the fold that it is asked about; encoders of
+the aligned source are those of objects in both cases.
 """
 
 import sys
@@ -87,10 +86,7 @@ def starts_of(
     ladder: Sequence[Rung],
     methods: Mapping[str, GlobalMethod],
 ) -> list[ScanStart]:
-    """Starts of each pair: drawn rungs, the poses of global methods, and a rung with noise added.
-
-    A rung without an error is not drawn, because it would show that there is no pose error.
-    """
+    """Return starts of each pair: drawn rungs with an error, the poses of global methods, and a rung with noise."""
     rungs = [rung for rung in ladder if rung.rotation_deg or rung.translation_m]
     starts: list[ScanStart] = []
     for k, pair in enumerate(pairs):
@@ -109,10 +105,7 @@ def starts_of(
 
 
 def diagnose(job: Job) -> None:
-    """Ask every explainer about the registrations of all data sets of scans, given the files of all sources of objects.
-
-    The column ``scans`` of the predictions has the data set.
-    """
+    """Ask every explainer about the registrations of all data sets of scans (column ``scans``) -> its predictions."""
     import pandas as pd
 
     scans = [job.scan_causes, job.scan_descriptors, job.scan_reenactments]

@@ -1,7 +1,4 @@
-"""Step ``register_scans``: pairs of scans registered by every method.
-
-Local methods start from a rung of the ladder, and from the pose of a global method.
-"""
+"""Step ``register_scans``: pairs of scans registered by every method."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -28,19 +25,12 @@ NORMAL_VOXELS, NORMAL_NEIGHBORS = 2, 30  # radius and most neighbors, as Open3D'
 
 @dataclass(frozen=True, kw_only=True)
 class TrialSettings:
-    """How the pairs are registered. Meters are those of a room: objects are enlarged to the size of a fragment of one.
+    """How the pairs are registered, in meters of a room: objects are enlarged to the size of a fragment of one."""
 
-    Attributes:
-        voxel_m: both scans are thinned to the mean of the points in each voxel,
-        points: and then to this number at most, drawn at random.
-        ladder: disturbances of the true pose from which local methods start: a pair starts on one rung.
-        global_start: the global method at whose pose local methods start a second time.
-    """
-
-    voxel_m: Annotated[float, Bounds(exclusiveMinimum=0, maximum=1)] = 0.05
-    points: Annotated[int, Bounds(minimum=64, maximum=65536)] = 5000
-    ladder: Distinct[Rung] = (Rung(0, 0),)
-    global_start: str = "fgr"
+    voxel_m: Annotated[float, Bounds(exclusiveMinimum=0, maximum=1)] = 0.05  # whose points are replaced by their mean
+    points: Annotated[int, Bounds(minimum=64, maximum=65536)] = 5000  # of these means, drawn, at most
+    ladder: Distinct[Rung] = (Rung(0, 0),)  # disturbances of the true pose; local methods start a pair on one of them
+    global_start: str = "fgr"  # the global method at whose pose local methods start a second time
 
 
 def run(job: Job) -> None:
@@ -92,10 +82,7 @@ def pair_to_register(pair: ScanPair, rung: Rung, settings: TrialSettings, *axes:
 
 
 def scan_normals(points_N_3: np.ndarray, radius: float, viewpoint_3: np.ndarray | None) -> np.ndarray:
-    """Unit normals (N, 3) that point to the sensor, or away from the middle where its position is unknown.
-
-    The radius is that of the neighbors, in the unit of the points; the viewpoint is in their frame.
-    """
+    """Return unit normals (N, 3) that point to the sensor, or away from the middle where its position is unknown."""
     cloud = open3d_cloud(points_N_3)
     cloud.estimate_normals(require_open3d().geometry.KDTreeSearchParamHybrid(radius, NORMAL_NEIGHBORS))
     normals_N_3 = np.array(cloud.normals)

@@ -1,7 +1,4 @@
-"""Steps ``shift`` and ``fit_learners``: samples unlike those of the training, and what learners predict for them.
-
-Distances to the training samples are in a space of features that is the same for every learner.
-"""
+"""Steps ``shift`` and ``fit_learners``: samples unlike those of the training, and what learners predict for them."""
 
 from __future__ import annotations
 
@@ -33,25 +30,15 @@ PRINCIPAL_COMPONENTS = 16  # of embeddings, for their distances
 
 @dataclass(frozen=True)
 class ShiftSettings:
-    """Samples unlike those of the training, and how their distance to it is measured.
+    """Samples unlike those of the training, and how their distance to it is measured."""
 
-    Attributes:
-        beyond: how the registrations with larger severities are made; their number is `beyond.test`.
-        encoder: the one that never sees some objects.
-        samples: the most samples of another source, and of objects that an encoder never saw.
-        held_out_share: of the objects, at least one, that this encoder and the learners on it never see.
-        train: training samples of that encoder, at most.
-        neighbours: nearest training samples in the mean distance.
-        shape_points: at which the local shape of a cloud is measured for the distances.
-    """
-
-    beyond: RegistrationSettings
-    encoder: EncoderSettings
-    samples: Annotated[int, Bounds(minimum=3)] = 90
-    held_out_share: OpenShare = 0.2
-    train: Annotated[int, Bounds(minimum=3)] = 300
-    neighbours: Count = 10
-    shape_points: Annotated[int, Bounds(minimum=4)] = 128
+    beyond: RegistrationSettings  # of larger severities
+    encoder: EncoderSettings  # the one that never sees some objects
+    samples: Annotated[int, Bounds(minimum=3)] = 90  # of another source, and of objects never seen, at most
+    held_out_share: OpenShare = 0.2  # of the objects, at least one, that this encoder and the learners on it never see
+    train: Annotated[int, Bounds(minimum=3)] = 300  # training samples of that encoder, at most
+    neighbours: Count = 10  # nearest training samples in the mean distance
+    shape_points: Annotated[int, Bounds(minimum=4)] = 128  # at which the local shape is measured for the distances
 
     @classmethod
     def from_dicts(cls, shift: dict, registrations: dict, encoder: dict) -> ShiftSettings:
@@ -123,15 +110,10 @@ def make_sets(
     seed: int,
     settings: ShiftSettings,
 ) -> ShiftedSets:
-    """Make, embed and measure all sets of one source and seed.
+    """Make, embed by the source's encoder and measure all sets of one source and seed; `other` is another source's.
 
     The sets of unseen objects are those of an encoder that never sees some families: the seed's fold, or a share of
     all. They are left out where the source has a single family.
-
-    Args:
-        registrations: of the source, with the encoder's embeddings attached.
-        other: registrations of another source, whose test samples are the set ``source``; None leaves that set out.
-        embed_own: embeds registrations, whose source has that name, by the source's encoder.
     """
     from gpca.encoders.training import embed, train_encoder
 
@@ -216,10 +198,7 @@ def knn_distance(train_N_F: np.ndarray, query_S_F: np.ndarray, neighbours: int =
 
 
 def mahalanobis_distance(train_N_F: np.ndarray, query_S_F: np.ndarray) -> np.ndarray:
-    """Distance (S,) to the mean of the training samples in units of their scatter.
-
-    The covariance is that of the standardized features, shrunk after Ledoit & Wolf (2004).
-    """
+    """Return the distance (S,) to the mean of the training samples by their covariance (Ledoit & Wolf 2004)."""
     from scipy.linalg import pinvh
     from sklearn.covariance import ledoit_wolf
     from sklearn.preprocessing import StandardScaler

@@ -7,11 +7,12 @@ import pytest
 from scipy.optimize import minimize
 from scipy.special import log_softmax, softmax
 
+from gpca.active_learning import stream
 from gpca.active_learning.acquisition import STREAMS
 from gpca.active_learning.rounds import LabelingTask, Samples, initial_gpc
 from gpca.active_learning.settings import ActiveLearningSettings, StreamSettings
-from gpca.active_learning.stream import arrival_order, run_stream
-from gpca.active_learning.stream_models import BayesianLayer, MondrianForest
+from gpca.active_learning.stream import BayesianLayer, arrival_order, run_stream
+from gpca.classifier.latents import Projection
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
@@ -141,103 +142,22 @@ def test_the_classifier_given_is_left_as_it_was(task, gpc, strategy):
     assert [array.tobytes() for array in gpc.attribute(task.test.h)] == before
 
 
-CENTERS_MONDRIAN = np.array([[0.0, 0], [4, 0], [0, 4]])
-
-
-def mondrian_blobs(n, seed):
-    label_N = np.arange(n) % 3
-    return CENTERS_MONDRIAN[label_N] + np.random.default_rng(seed).normal(size=(n, 2)), label_N
-
-
-def forest(x_N_D, label_N, order=None, seed=0, trees=20, first=None):
-    """A forest that gets the first samples at once and the others one by one."""
-    made = MondrianForest(3, np.random.default_rng(seed), trees)
-    order = np.arange(len(x_N_D)) if order is None else order
-    first = len(order) if first is None else first
-    for rows in (order[:first], *order[first:, None]):
-        if len(rows):
-            made.learn(x_N_D[rows], label_N[rows])
-    return made
-
-
-def boxes(node, earlier=0.0):
-    yield node, earlier
-    for child in node.children or ():
-        yield from boxes(child, node.time)
-
-
-def samples(node):
-    if node.children is None:
-        return node.x_N_D
-    return np.concatenate([samples(child) for child in node.children])
-
-
-@pytest.fixture(scope="module")
-def grown():
-    return forest(*mondrian_blobs(60, 0), first=1)
-
-
-def test_blobs_are_told_apart_and_the_scores_are_probabilities(grown):
-    x_N_D, label_N = mondrian_blobs(90, 1)
-    scores_N_C = grown.scores(x_N_D)
-    assert scores_N_C.sum(axis=1) == pytest.approx(1)
-    assert (scores_N_C >= 0).all()
-    assert np.mean(scores_N_C.argmax(axis=1) == label_N) > 0.9
-
-
-def test_far_from_everything_the_scores_are_those_of_no_class(grown):
-    near, far = grown.scores(np.array([[4.0, 0], [4000, -4000]]))
-    assert near.max() > 0.8
-    assert far == pytest.approx(np.full(3, 1 / 3), abs=0.05)
-
-
-def test_the_boxes_hold_their_samples_and_split_later_than_their_parents(grown):
-    for root in grown._roots:
-        assert len(samples(root)) == 60
-        for node, earlier in boxes(root):
-            assert node.time > earlier
-            own = samples(node)
-            assert (node.low_D == own.min(axis=0)).all()
-            assert (node.high_D == own.max(axis=0)).all()
-            if node.children:
-                below, above = (samples(child)[:, node.axis] for child in node.children)
-                assert below.max() <= node.place < above.min()
-
-
-def test_a_leaf_of_one_class_waits():
-    made = forest(np.random.default_rng(0).normal(size=(30, 2)), np.full(30, 1), first=1)
-    assert all(root.children is None and root.counts_C.tolist() == [0, 30, 0] for root in made._roots)
-
-
-@pytest.mark.parametrize(("labels", "scores"), [([2], [0, 0, 1]), ([0, 0, 0, 1], [0.75, 0.25, 0])])
-def test_samples_at_one_place_share_a_leaf(labels, scores):
-    made = forest(np.zeros((len(labels), 2)), np.array(labels))
-    assert made.scores(np.zeros((1, 2)))[0] == pytest.approx(scores)
-
-
-def test_it_does_not_matter_whether_samples_come_at_once_or_one_by_one():
-    x_N_D, label_N = mondrian_blobs(30, 3)
-    asked = mondrian_blobs(15, 4)[0]
-    at_once = forest(x_N_D, label_N, trees=100).scores(asked)
-    backwards = forest(x_N_D, label_N, order=np.arange(30)[::-1], first=1, seed=1, trees=100).scores(asked)
-    assert np.abs(at_once - backwards).max() < 0.2
-    assert np.abs(at_once - backwards).mean() < 0.04
-
-
 RANDOM = np.random.default_rng(0)
 X_N_D = RANDOM.normal(size=(40, 3))
 LABEL_N = X_N_D[:, :3].argmax(axis=1)
-NORMAL_M_C = RANDOM.normal(size=(200, 3))
 
 
-def layer(rows, deviation=3.0):
-    made = BayesianLayer(3, 3, deviation)
-    made.learn(X_N_D[rows], LABEL_N[rows])
-    return made
+def inputs(x_N_D):
+    return Projection(x_N_D, np.empty((3, len(x_N_D), 0)), np.empty((3, len(x_N_D))))
+
+
+def layer(rows):
+    rows = np.asarray(rows, int)
+    return BayesianLayer(Samples(inputs(X_N_D[rows]), np.array(CONCEPTS)[LABEL_N[rows]]), "blobs", 0)
 
 
 def test_before_any_label_the_logits_have_the_deviation_of_the_prior():
-    mean_N_C, covariance_N_C_C = layer([]).logits(np.ones((1, 3)))
+    mean_N_C, covariance_N_C_C = layer([]).logits(inputs(np.ones((1, 3))))
     assert not mean_N_C.any()
     assert covariance_N_C_C[0] == pytest.approx(9 * np.eye(3))
 
@@ -258,22 +178,23 @@ def test_after_one_label_it_is_laplaces_approximation():
 
 def test_labels_teach_it_and_make_it_surer_but_far_away_no_surer_than_the_prior_allows():
     some, many = layer(np.arange(5)), layer(np.arange(40))
-    _, covariance = many.logits(np.array([[0.0, 0, 0], [50, 50, -100]]))
+    _, covariance = many.logits(inputs(np.array([[0.0, 0, 0], [50, 50, -100]])))
     assert np.trace(covariance[1]) > 20 * np.trace(covariance[0])
-    scores_N_C, variances_N_C, bald_N = many.attribute(X_N_D, NORMAL_M_C)
+    scores_N_C, variances_N_C, doubt_N = many.attribute(inputs(X_N_D))
     assert np.mean(scores_N_C.argmax(axis=1) == LABEL_N) > 0.85
-    assert bald_N.mean() < some.attribute(X_N_D, NORMAL_M_C)[2].mean()
+    assert doubt_N.mean() < some.attribute(inputs(X_N_D))[2].mean()
     assert scores_N_C.sum(axis=1) == pytest.approx(1)
     assert (variances_N_C > 0).all()
 
 
 def test_what_was_believed_before_is_the_prior_of_what_comes_after():
     one = layer(np.arange(20))
-    one.learn(X_N_D[20:], LABEL_N[20:])
+    one.update(inputs(X_N_D[20:]), np.array(CONCEPTS)[LABEL_N[20:]])
     assert one._mean_C_F == pytest.approx(layer(np.arange(40))._mean_C_F)
 
 
 @pytest.mark.parametrize("deviation", [0.1, 100.0])
-def test_no_prior_makes_it_diverge(deviation):
-    scores_N_C = layer(np.arange(40), deviation).attribute(X_N_D, NORMAL_M_C)[0]
+def test_no_prior_makes_it_diverge(monkeypatch, deviation):
+    monkeypatch.setattr(stream, "DEVIATION", deviation)
+    scores_N_C = layer(np.arange(40)).scores(inputs(X_N_D))
     assert np.isfinite(scores_N_C).all()
