@@ -65,7 +65,7 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
         "registrations encoders/ embeddings/ uncertainty/ methods/ estimates/ descriptors/ shifted/ residuals_forest "
         "predictions/ycb/shap_additive predictions/ycb/softmax_head diagnoses/ycb/gate_rmse fig3_concepts",
     ),
-    "gpca/steps/shift.py": ("shifted/ learners/ reliability", "predictions active_learning diagnoses/ model.pt"),
+    "gpca/steps/shift.py": ("shifted/ learners/ table5_shift", "predictions active_learning diagnoses/ model.pt"),
     "baselines/heads.py": ("learners/ table5_learners", "shifted/ predictions diagnoses/ kernels"),
     "gpca/experiments/kernel_grid.py": (
         "figures/kernel_learning_curves kernels.csv table4_grid",
@@ -188,11 +188,11 @@ def test_a_figure_of_another_source_is_drawn_alone(finished):
 
 
 def test_every_table_figure_and_stage_is_a_target_by_name(project):
-    names = ("table5", "reliability", "objects", "paper")
+    names = ("table5", "kernel_learning_curves", "objects", "paper")
     planned = project.dry_run(*names, "--configfile", "config/smoke.yaml")
     inputs = {rule: files for rule, files, _ in planned.plan if rule in names}
     assert inputs["table5"] == {"results/smoke/tables/table5_learners.md"}
-    assert "results/smoke/figures/reliability.pdf" in planned.outputs
+    assert "results/smoke/figures/kernel_learning_curves.pdf" in planned.outputs
     assert inputs["objects"] == {f"results/smoke/objects/{name}.npz" for name in ("coffee_cup", "ycb")}
     paper = inputs["paper"]
     figures = {Path(path).stem for path in paper if "/figures/" in path}

@@ -6,7 +6,6 @@ import numpy as np
 
 from gpca.reporting.figures.style import SMALL_PT, TEXT_WIDTH_IN, blues, use_style
 
-MOST_PER_ROW = 5
 LETTERS_PER_IN, LETTERS_OF_SIGN = 18, 8  # of a legend, and those that a sign before a label takes the room of
 
 
@@ -14,16 +13,6 @@ def panels(rows: int, columns: int, height_in: float, width_in: float = TEXT_WID
     """Return a figure and its panels (rows, columns); the options are those of ``pyplot.subplots``."""
     size = (width_in, height_in)
     return use_style().subplots(rows, columns, figsize=size, squeeze=False, layout="constrained", **options)
-
-
-def panels_in_lines(count: int, panel_height_in: float, most: int = MOST_PER_ROW, **options):
-    """Return a figure and its panels with shared axes, in lines of `most` or fewer, as even as they can be."""
-    lines = -(-count // most)
-    options = {"sharex": True, "sharey": True} | options
-    figure, grid = panels(lines, -(-count // lines), 0.75 + panel_height_in * lines, **options)
-    for spare in grid.flat[count:]:
-        spare.set_visible(False)
-    return figure, list(grid.flat[:count])
 
 
 def label_outer(of_panels: list, across: str, up: str) -> None:
