@@ -34,7 +34,7 @@ def check(config: dict, _left_out: LeftOut) -> None:
 
 EXPERIMENT = Experiment(
     name="estimators",
-    beside=("estimator_tables", "estimator_figure"),
+    beside=("estimator_tables",),
     sections={
         "estimators": ByName,
         "estimator_pairs": Annotated[dict, part_of(EstimatorPairSettings, without=("failed",))],  # in success.error

@@ -15,17 +15,6 @@ def panels(rows: int, columns: int, height_in: float, width_in: float = TEXT_WID
     return use_style().subplots(rows, columns, figsize=size, squeeze=False, layout="constrained", **options)
 
 
-def label_outer(of_panels: list, across: str, up: str) -> None:
-    """Label the axes of the panels that have none to their left, and of those that have none below them."""
-    per_row = of_panels[0].get_gridspec().ncols
-    for i, panel in enumerate(of_panels):
-        if i % per_row == 0:
-            panel.set_ylabel(up)
-        if i + per_row >= len(of_panels):
-            panel.set_xlabel(across)
-            panel.tick_params(labelbottom=True)
-
-
 def legend_below(figure, handles: list, labels: list[str] | None = None, columns: int = 0, **style) -> None:
     """Name lines and markers below all panels, in columns, or in one line where the figure is wide enough for it."""
     labels = [handle.get_label() for handle in handles] if labels is None else labels
