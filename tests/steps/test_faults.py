@@ -87,7 +87,6 @@ FAULTS = {
     "estimate": [
         (removed("causes.npz"), {}, "causes.npz: no such file"),
         (arrays_changed("objects.npz", names=reversed_order), {}, ANOTHER_NAME),
-        (untouched, {"--samples": ["causes.npz"]}, "causes.npz"),
     ],
     "train_on_causes": [
         (untouched, {"--causes": "registrations.npz"}, "registrations.npz: array"),
