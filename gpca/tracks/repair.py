@@ -43,6 +43,8 @@ def repair_table(samples: TrackSamples, function: Own, name: str) -> Table:
     import pandas as pd
 
     config = samples.config
+    if name in titles_of(config):
+        name = f"{name} (here)"
     parts = [(source, seed) for source, seed, _ in samples.parts()]
     attempts = samples.files(f"repairs/{CAUSES}/{source}/seed{seed}.npz" for source, seed in parts)
     settings = own_settings(config, {}, config["diagnosis"]["reenactment"])

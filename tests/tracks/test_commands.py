@@ -8,14 +8,20 @@ import numpy as np
 import pytest
 
 from gpca.__main__ import main
+from gpca.alignment.icp import ICPSettings
 from gpca.classifier.scores import Attribution
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process import plugins
+from gpca.reenactment.settings import ReenactmentSettings
+from gpca.steps.repair import RepairSettings, World, searched, try_all
 from gpca.tracks import leaderboard, samples
+from gpca.tracks import published as published_module
 from gpca.tracks.leaderboard import MARK
 
 from ..accessible import faults_of
-from .conftest import SOURCE
+from .conftest import SEED, SOURCE
+
+FILE = f"causes/{SOURCE}/seed{SEED}.npz"
 
 
 def test_a_method_in_a_file_stands_among_the_published_rows(method, published, run, tmp_path, capsys):
@@ -66,6 +72,31 @@ def test_a_method_that_cannot_be_asked_is_refused_in_one_line(words, line, metho
     assert main(["bench", *words, "--samples", str(run)]) == 2
     said = [text for text in capsys.readouterr().err.splitlines() if "learning and" not in text]
     assert len(said) == 1 and line in said[0]
+
+
+def test_a_function_stands_among_the_repairs_even_if_it_is_named_like_one(
+    shipped, causes, four, config, tmp_path, monkeypatch, capsys
+):
+    few = causes.subset(np.arange(3))
+    registrations = replace(few.registrations, split=np.full(len(few), "test"), axes=(SOURCE, SEED))
+    few = replace(few, registrations=registrations, truth_again=few.truth)
+    found = lambda pair, _row: searched(pair, ReenactmentSettings())  # noqa: E731
+    world = World(few, None, four)
+    attempts, _ = try_all(few, world, RepairSettings(), ICPSettings(), "model", found, (SOURCE, SEED))
+    few.save(tmp_path / FILE)
+    four.save(tmp_path / f"objects/{SOURCE}.npz", SOURCE)
+    attempts.save(tmp_path / f"repairs/{FILE}", (SOURCE, SEED))
+    monkeypatch.setattr(published_module, "FOLDER", tmp_path)
+    replace(shipped, hashes={}).save(tmp_path / "causes.npz")
+    monkeypatch.setattr(samples.TrackSamples, "config", config | {"success": {"error": 0.03}})
+    monkeypatch.chdir(tmp_path)
+    for name, answer in (("repair", "T_init, 1.0"), ("fails", "source[10**9]")):
+        (tmp_path / f"{name}.py").write_text(f"def repair(source, target, T_init):\n    return {answer}\n")
+    assert main(["bench", "repair", "repair.py", "--samples", "."]) == 0
+    rows = capsys.readouterr().out.splitlines()
+    assert [sum(title in row for row in rows) for title in ("→ repair (here) ", "(here), by the judge")] == [1, 1]
+    assert main(["bench", "repair", "fails.py", "--samples", "."]) == 2
+    assert "fails.py, line 2: IndexError: " in capsys.readouterr().err.splitlines()[-1]
 
 
 SUMMARY = "    def summary(self, registrations):\n        n = len(registrations)\n        return {}, None, None\n"
