@@ -12,6 +12,8 @@ class InputError(ValueError):
     The command line prints it to stderr and exits with status 2.
     """
 
+    further: tuple[str, ...] = ()  # lines of other faults of the same settings
+
     def __init__(self, subject: object, fault: str, remedy: str = "") -> None:
         line = f"{subject}: {fault}" + (f"; {remedy}" if remedy else "")
         super().__init__(" ".join(line.split()))

@@ -147,7 +147,9 @@ def read_settings(kind: type[T], settings: Mapping[str, Any], subject: str = "se
     try:
         return adapter.validate_json(json.dumps([settings], default=as_json))[0]
     except ValidationError as fault:
-        raise _input_error(fault.errors(), settings, adapter, subject) from None
+        worst, *others = _input_errors(fault.errors(), settings, adapter, subject)
+        worst.further = tuple(map(str, others))
+        raise worst from None
 
 
 def _fitted(kind: Any, value: Any) -> Any:
@@ -227,10 +229,16 @@ def _adapter(kind: Any) -> TypeAdapter:
     return TypeAdapter(list[kind], config=config)  # a list, as a dataclass takes no config from elsewhere
 
 
-def _input_error(faults: list[ErrorDetails], settings: Any, adapter: TypeAdapter, subject: str) -> InputError:
-    """Return the worst fault: an unknown key, else a value of the right type."""
-    fault = min(faults, key=lambda fault: (fault["type"] not in UNKNOWN, fault["type"].endswith("_type")))
-    path = list(_path(settings, fault["loc"][1:]))
+def _input_errors(faults: list[ErrorDetails], settings: Any, adapter: TypeAdapter, subject: str) -> list[InputError]:
+    """Return the worst fault of each key: unknown keys first, then values of the right type."""
+    worst: dict[tuple, InputError] = {}
+    for fault in sorted(faults, key=lambda fault: (fault["type"] not in UNKNOWN, fault["type"].endswith("_type"))):
+        path = list(_path(settings, fault["loc"][1:]))
+        worst.setdefault(tuple(path), _input_error(fault, path, adapter, subject))
+    return list(worst.values())
+
+
+def _input_error(fault: ErrorDetails, path: list[str | int], adapter: TypeAdapter, subject: str) -> InputError:
     key, value = ".".join(map(str, path)), fault["input"]
     if fault["type"] in UNKNOWN:
         names = list(_keys_at(adapter.json_schema(), path[:-1]))

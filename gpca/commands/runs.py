@@ -1,12 +1,16 @@
 """Commands for configs and finished runs: ``check-config``, ``check-reference`` and ``compare``."""
 
+import re
 import sys
 from argparse import ArgumentParser, Namespace
+from contextlib import suppress
+from functools import reduce
 from pathlib import Path
 
 from gpca.errors import InputError
 
 CONFIG = Path("config/config.yaml")  # relative to the folder of the suite
+KEY = re.compile(r"config key ([^\s:]+): ")  # before a fault
 
 
 def add_check_config_arguments(parser: ArgumentParser) -> None:
@@ -14,17 +18,37 @@ def add_check_config_arguments(parser: ArgumentParser) -> None:
     add("configs", nargs="*", type=Path, help="config files, merged into the default in this order")
 
 
-def run_check_config(options: Namespace) -> None:
-    """Merge the configs into the default and check the result.
+def run_check_config(options: Namespace) -> int:
+    """Merge the configs into the default and check the result: all faults are lines on stderr, with status 2.
 
     Snakemake reads the files of ``--configfile`` before the suite does, so files that it cannot read end in its own
-    messages. Here, every fault is one line.
+    messages.
     """
-    from gpca.config.check import read
+    from gpca.config.check import check
     from gpca.config.layers import read_file, with_defaults
 
-    config, sources = read(with_defaults(*map(read_file, options.configs)), {})
+    given = {path: read_file(path) for path in options.configs}
+    config = with_defaults(*given.values())
+    faults: list[str] = []
+    sources = check(config, faults)
+    if faults:
+        firsts: dict[str, str] = {}  # one fault may show at several keys
+        for line in faults:
+            firsts.setdefault(KEY.sub("", line), f"gpca check-config: {_file_of(line, given)}{line}")
+        print(*firsts.values(), sep="\n", file=sys.stderr)
+        return 2
     print(f"run {config['run']}: valid; sources {', '.join(sources)}; seeds {', '.join(map(str, config['seeds']))}")
+    return 0
+
+
+def _file_of(line: str, configs: dict[Path, dict]) -> str:
+    """Return the last config that has the key of a fault, with a colon; empty where none has it."""
+    key = KEY.match(line)
+    for path, config in reversed(configs.items()):
+        with suppress(LookupError, TypeError):
+            reduce(lambda part, name: part[name], (key[1] if key else line).split("."), config)
+            return f"{path}: "
+    return ""
 
 
 def add_check_reference_arguments(parser: ArgumentParser) -> None:

@@ -1,6 +1,7 @@
 """Checks the configuration of a run when the workflow loads, so that a mistake stops it with one line."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
 from functools import partial
 from typing import Any
 
@@ -36,44 +37,70 @@ def read(config: dict, command_line: Mapping, as_module: bool = False) -> tuple[
     return with_success(layers.without_false(whole)), sources
 
 
-def check(config: dict) -> dict[str, dict]:
+def check(config: dict, faults: list[str] | None = None) -> dict[str, dict]:
     """Check a configuration, except entries left out with ``false``; it is not changed.
 
-    Returns the resolved entry of every source, by name. The line of an InputError names the key.
+    Returns the resolved entry of every source, by name. The line of an InputError names the key. With a list, lines of
+    all faults are added to it instead; names are checked only if settings and places are without fault.
     """
-    require_plain(config, "config key")
-    with_key("plugins", use, config.get("plugins") or [])
-    whole = layers.without_false(config)
-    read_settings(whole_config(), whole, "config key")
-    whole = with_success(whole)
-    layers.check_left_out(config)
+    noted, sources = partial(_noted, faults), {}
+    with noted():
+        require_plain(config, "config key")
+        with_key("plugins", use, config.get("plugins") or [])
+        whole = layers.without_false(config)
+        read_settings(whole_config(), whole, "config key")
+        whole = with_success(whole)
+        for check_first in (_check_places, _check_registrations):
+            with noted():
+                check_first(whole)
+    if faults:
+        return {}
     left_out = partial(layers.names_left_out, config)
-    if whole["run"].lower() in RESERVED:
-        raise InputError("config key run", f"results/{whole['run']} is reserved", "choose another name")
-    if whole["data_dir"] is not None:
-        with_key("data_dir", require_place, whole["data_dir"])
-    folder = with_key("downloads", require_place, whole["downloads"])
-    existing = next((path for path in (folder, *folder.parents) if path.exists()), folder)
-    if not existing.is_dir():
-        raise InputError("config key downloads", f"{existing} is not a folder", "name a folder; it need not exist")
-    _check_registrations(whole)
-    _check_names(whole, left_out)
-    layers.check_listed(whole, left_out)
-    for experiment in experiments():
-        experiment.check(whole, left_out)
+    for each in (
+        partial(layers.check_left_out, config),
+        partial(_check_names, whole, left_out, noted),
+        partial(layers.check_listed, whole, left_out),
+        *(partial(experiment.check, whole, left_out) for experiment in experiments()),
+    ):
+        with noted():
+            each()
     for key, read_splits, names in (
         ("objects", read_object_splits, whole["sources"]),
         ("scenes", read_scene_splits, whole["real_world"]["datasets"] or ()),
     ):
         if place := whole["splits"][key]:
-            path = with_key(f"splits.{key}", find_file, place, whole["data_dir"])
-            for name in names:
-                with_key(f"splits.{key}", read_splits, path, name)
-    return {
-        name: {"stand_in": entry["kind"] == "procedural"}
-        | with_key(f"sources.{name}", resolve, entry, whole["data_dir"])
-        for name, entry in whole["sources"].items()
-    }
+            with noted():
+                path = with_key(f"splits.{key}", find_file, place, whole["data_dir"])
+                for name in names:
+                    with_key(f"splits.{key}", read_splits, path, name)
+    for name, entry in whole["sources"].items():
+        with noted():
+            resolved = with_key(f"sources.{name}", resolve, entry, whole["data_dir"])
+            sources[name] = {"stand_in": entry["kind"] == "procedural"} | resolved
+    return sources
+
+
+@contextmanager
+def _noted(faults: list[str] | None) -> Iterator[None]:
+    """Add the lines of a fault to a list, if there is one."""
+    try:
+        yield
+    except (InputError, OSError) as fault:
+        if faults is None:
+            raise
+        faults += [str(fault), *getattr(fault, "further", ())]
+
+
+def _check_places(config: dict) -> None:
+    if config["run"].lower() in RESERVED:
+        raise InputError("config key run", f"results/{config['run']} is reserved", "choose another name")
+    if config["data_dir"] is not None:
+        data = with_key("data_dir", require_place, config["data_dir"])
+        with_key("data_dir", data.exists)  # an OSError for a name that is too long
+    folder = with_key("downloads", require_place, config["downloads"])
+    existing = next((path for path in (folder, *folder.parents) if path.exists()), folder)
+    if not existing.is_dir():
+        raise InputError("config key downloads", f"{existing} is not a folder", "name a folder; it need not exist")
 
 
 def _check_registrations(config: dict) -> None:
@@ -97,28 +124,34 @@ def _check_registrations(config: dict) -> None:
             raise InputError(f"config key {section}.train", fault, f"use fewer or lower {key}")
 
 
-def _check_names(config: dict, left_out: LeftOut) -> None:
+def _check_names(config: dict, left_out: LeftOut, noted: Callable[[], AbstractContextManager]) -> None:
     """Check the names of encoders, explainers and sources, and the points that encoders and explainers read.
 
     Draws of points from depth frames are not checked: smaller clouds repeat points.
     """
     encoders, points = config["encoders"], config["registrations"]["cloud_points"]
     for name, encoder in encoders.items():
-        with_key(f"encoders.{name}.backbone", require_backbone, encoder["backbone"])
-        require_draws(f"encoders.{name}", encoder, points, "registrations.cloud_points")
-    require_names("embedding.encoder", [config["embedding"]["encoder"]], encoders, "encoder", left_out("encoders"))
+        with noted():
+            with_key(f"encoders.{name}.backbone", require_backbone, encoder["backbone"])
+            require_draws(f"encoders.{name}", encoder, points, "registrations.cloud_points")
     for name, settings in config["explainers"].items():
         key = f"explainers.{name}"
-        with_key(key, require_settings, name, settings or {})
-        if design := explainer_entry(name).design:
-            require_names(key, [design], config["uncertainty"], "uncertainty", left_out("uncertainty"))
-        if (neighbors := (settings or {}).get("neighbours", 0)) > points:
-            fault = f"{neighbors} neighbors are too many for {points} points of a cloud"
-            raise InputError(f"config key {key}.neighbours", fault, "lower it, or raise registrations.cloud_points")
+        with noted():
+            with_key(key, require_settings, name, settings or {})
+            if design := explainer_entry(name).design:
+                require_names(key, [design], config["uncertainty"], "uncertainty", left_out("uncertainty"))
+            if (neighbors := (settings or {}).get("neighbours", 0)) > points:
+                fault = f"{neighbors} neighbors are too many for {points} points of a cloud"
+                raise InputError(f"config key {key}.neighbours", fault, "lower it, or raise registrations.cloud_points")
     model, sources = config["model"], config["sources"]
-    require_names("figures.source", [config["figures"]["source"]], sources, "source", left_out("sources"))
-    require_names("model.source", [model["source"]], (*sources, REAL_WORLD), "source", left_out("sources"))
-    require_names("model.encoder", [model["encoder"]], encoders, "encoder", left_out("encoders"))
+    for key, value, names, noun in (
+        ("embedding.encoder", config["embedding"]["encoder"], encoders, "encoder"),
+        ("figures.source", config["figures"]["source"], sources, "source"),
+        ("model.source", model["source"], (*sources, REAL_WORLD), "source"),
+        ("model.encoder", model["encoder"], encoders, "encoder"),
+    ):
+        with noted():
+            require_names(key, [value], names, noun, left_out(f"{noun}s"))
 
 
 def with_success(config: Mapping[str, Any]) -> dict[str, Any]:

@@ -2,6 +2,7 @@ import re
 
 import pytest
 
+from gpca.__main__ import main
 from gpca.config import check as run_config
 from gpca.config.check import check
 from gpca.config.layers import with_types
@@ -195,6 +196,23 @@ def test_a_fault_is_one_line_that_names_the_key(key, value, message):
     assert line.startswith("config key ")
     assert message in line
     assert "\n" not in line
+
+
+def test_the_command_lists_all_faults_with_their_files(tmp_path, capsys):
+    (tmp_path / "first.yaml").write_text("seedz: [1]\ncauses: {train: -5}\n")
+    (tmp_path / "other.yaml").write_text("causes: {points: 7}\n")
+    assert main(["check-config", *map(str, sorted(tmp_path.glob("*.yaml")))]) == 2
+    lines = [line.removeprefix(f"gpca check-config: {tmp_path}/") for line in capsys.readouterr().err.splitlines()]
+    assert lines == [
+        "first.yaml: config key seedz: unknown; did you mean seeds?",
+        "first.yaml: config key causes.train: -5 should be greater than or equal to 12",
+        "other.yaml: config key causes.points: 7 should be a valid array; give a list: [7]",
+    ]
+    # A setting of an explainer that several experiments ask is one fault; further ones are found beside it.
+    (tmp_path / "first.yaml").write_text("explainers: {gpca: {bar: 1}}\nfigures: {source: nowhere}\n")
+    assert main(["check-config", str(tmp_path / "first.yaml")]) == 2
+    keys = [line.split(": ")[2] for line in capsys.readouterr().err.splitlines()]
+    assert keys == ["config key explainers.gpca", "config key figures.source"]
 
 
 FAULTS_OF_STAND_INS = [
