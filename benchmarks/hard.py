@@ -32,11 +32,14 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("files", type=Path, nargs="+")
     parser.add_argument("--seed", type=int, default=100)
     parser.add_argument("--candidates", type=int, nargs=2, default=(0, 1000))
+    parser.add_argument("--screened", action="store_true")
     parser.add_argument("--out", type=Path)
     options = parser.parse_args(arguments)
     prepare()
     if options.what == "draw":
-        numbers_N_F, cause_N, object_N = draw(options.files[0], options.seed, range(*options.candidates))
+        numbers_N_F, cause_N, object_N = draw(
+            options.files[0], options.seed, range(*options.candidates), options.screened
+        )
         np.savez_compressed(options.out, numbers=numbers_N_F, cause=cause_N, object=object_N)
         return
     drawn = [np.load(path) for path in options.files]
@@ -51,11 +54,14 @@ def main(arguments: list[str] | None = None) -> None:
         print(json.dumps(check(numbers_N_F, cause_N, object_N, options.seed)))
 
 
-def draw(objects_file: Path, seed: int, candidates: range) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return trivial numbers (N, 10), dominant causes and objects of the candidates that failed."""
+def draw(objects_file: Path, seed: int, candidates: range, screened: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return trivial numbers (N, 10), dominant causes and objects of the candidates that failed from one cause.
+
+    Those `screened` leave out what the matching so far accepts in no case.
+    """
     from gpca.causes.candidate import Registrar, Unmeasurable, draw_applied, draw_candidate
     from gpca.causes.drawing import ENDS, group_of, state_of
-    from gpca.causes.matching import numbers_of
+    from gpca.causes.matching import Matching, numbers_of
     from gpca.causes.measuring import Measuring, read_subjects
     from gpca.causes.settings import CauseSettings
     from gpca.causes.truth import FAILED
@@ -67,6 +73,7 @@ def draw(objects_file: Path, seed: int, candidates: range) -> tuple[np.ndarray, 
     config = with_defaults()
     settings = CauseSettings.from_dict(config["causes"] | config["controls"]["hard"], config["registrations"]["icp"])
     subjects, measuring, rows = read_subjects(ObjectClouds.load(objects_file)), Measuring(settings, np.inf), []
+    matching = Matching.load()
     for number in candidates:
         subject, axes = subjects[number % len(subjects)], (objects_file.stem, seed, "matching", number)
         random = generator(*axes)
@@ -74,10 +81,14 @@ def draw(objects_file: Path, seed: int, candidates: range) -> tuple[np.ndarray, 
         registrar = Registrar(candidate, settings)
         measured = measuring.counterfactuals(registrar, subject, axes, "starts")
         try:
+            numbers_F = numbers_of(measuring.observed(registrar, subject, axes, most=1))
+            if screened and not any(matching.acceptances(numbers_F).values()):
+                continue
             if state_of(measuring.truth(measured, ENDS)) == FAILED:
-                cause, _ = group_of(measuring.truth(measured))
-                if cause in CONCEPTS:
-                    rows.append((numbers_of(measuring.observed(registrar, subject, axes)), cause, subject.name))
+                truth = measuring.truth(measured)
+                cause, _ = group_of(truth)
+                if cause in CONCEPTS and truth.margin[0] >= settings.limits.margin:
+                    rows.append((numbers_F, cause, subject.name))
         except Unmeasurable:
             continue
     numbers, causes, names = zip(*rows, strict=True)
@@ -116,7 +127,8 @@ def check(numbers_N_F: np.ndarray, cause_N: np.ndarray, object_N: np.ndarray, se
     from gpca.seeds import generator
 
     random, matching = generator("matching", seed), Matching.load()
-    acceptance_N = np.array([matching.acceptance(*each) for each in zip(numbers_N_F, cause_N, strict=True)])
+    drawn = zip(numbers_N_F, cause_N, strict=True)
+    acceptance_N = np.array([matching.acceptances(numbers_F)[cause] for numbers_F, cause in drawn])
     accepted_N = random.random(len(cause_N)) < acceptance_N
     result = {"candidates": len(cause_N), "accepted": int(accepted_N.sum())}
     result |= {f"accepted_{cause}": round(acceptance_N[cause_N == cause].mean(), 3) for cause in CONCEPTS}

@@ -22,6 +22,7 @@ from gpca.process.progress import progress
 from gpca.seeds import generator
 
 Group = tuple[str, bool]  # state or, of the failed, the dominant cause; whether there are several causes
+TIED = " tied"  # after the cause of a candidate in which another adds as much to the error, up to the margin
 GIVEN_AWAY = " given away"  # after the cause of a candidate that was refused for its trivial numbers
 COLUMNS = ("split", "object", "group", "several", "kept", "refused")
 UNSEEN: Group = ("any", False)  # of a candidate that was not registered
@@ -234,7 +235,12 @@ class _Drawing:
             return None, UNSEEN
         registrar = Registrar(draw_candidate(subject.surface, applied, settings, random), settings)
         measured = measuring.counterfactuals(registrar, subject, axes, "starts")
+        accepted = dict.fromkeys(CONCEPTS, 1.0)
         try:
+            if settings.matched:
+                accepted = Matching.load().acceptances(numbers_of(measuring.observed(registrar, subject, axes, most=1)))
+                if not any(accepted.values()):
+                    return None, (f"{UNSEEN[0]}{GIVEN_AWAY}", False)
             state = state_of(measuring.truth(measured, ENDS))
             if not quotas.wants_state(state, applied):
                 return None, (state, False)
@@ -242,12 +248,11 @@ class _Drawing:
             group = group_of(truth)
             if not quotas.wants(group):
                 return None, group
-            observed = measuring.observed(registrar, subject, axes)
-            if settings.matched and group[0] in CONCEPTS:
-                acceptance = Matching.load().acceptance(numbers_of(observed), group[0])
-                if generator(*axes, "matched").random() >= acceptance:
-                    return None, (f"{group[0]}{GIVEN_AWAY}", group[1])
-            record = {**observed, "truth": truth}
+            if group[0] in CONCEPTS and truth.margin[0] < settings.limits.margin:
+                return None, (f"{group[0]}{TIED}", group[1])
+            if generator(*axes, "matched").random() >= accepted.get(group[0], 1.0):
+                return None, (f"{group[0]}{GIVEN_AWAY}", group[1])
+            record = {**measuring.observed(registrar, subject, axes), "truth": truth}
             if split == "test":
                 record["again"] = measuring.truth(measuring.counterfactuals(registrar, subject, axes, "other starts"))
         except Unmeasurable as fault:

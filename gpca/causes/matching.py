@@ -1,8 +1,9 @@
 """Matches samples by their trivial numbers, so that these know nothing of the dominant cause (docs/controls.md).
 
 Let g(c | x) be the probability of a cause, were all equally frequent, of a candidate with trivial numbers x. Accepting
-candidates of cause c with probability min g / g(c) leaves every cause with the same distribution of x. g is a logistic
-regression on x, its squares and products, fitted by ``benchmarks/hard.py`` to development objects and seeds.
+candidates of cause c with probability min g / g(c) leaves every cause with the same distribution of x; where min g is
+below `LEAST`, which hardly any would pass, none is measured. g is a logistic regression on x, its squares and products,
+fitted by ``benchmarks/hard.py`` to development objects and seeds.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ FILE = Path(__file__).with_suffix(".csv")
 COLUMNS = ("term", "center", "scale", *CONCEPTS)
 INTERCEPT = "1"
 FARTHEST = 4.0  # scales, to which the numbers are clipped
+LEAST = 0.1  # probability of the least probable cause
 DIGITS = 9  # of a probability, so that the last ones of a processor decide nothing
 
 
@@ -67,9 +69,11 @@ class Matching:
         term_T = self.expanded(numbers_10)
         logits = [fsum((weights_T * term_T).tolist()) for weights_T in self.weights]
         odds = [exp(logit - max(logits)) for logit in logits]
-        return dict(zip(CONCEPTS, (each / fsum(odds) for each in odds), strict=True))
+        return dict(zip(CONCEPTS, (round(each / fsum(odds), DIGITS) for each in odds), strict=True))
 
-    def acceptance(self, numbers_10: np.ndarray, cause: str) -> float:
-        """Return the probability by which a candidate with this dominant cause is accepted."""
-        probability = self.probabilities(numbers_10)
-        return round(min(probability.values()) / max(probability[cause], 1e-300), DIGITS)
+    def acceptances(self, numbers_10: np.ndarray) -> dict[str, float]:
+        """Return the probability by which a candidate is accepted, by the dominant cause that it may have."""
+        probabilities = self.probabilities(numbers_10)
+        if (least := min(probabilities.values())) < LEAST:
+            return dict.fromkeys(CONCEPTS, 0.0)
+        return {cause: least / probability for cause, probability in probabilities.items()}

@@ -144,10 +144,10 @@ class Measuring:
         limits = self.settings.limits
         return Truth(error_1_8, uncertainty_1_8, limits.nominal, limits.failed, limits.cause, self.uncertainty_limit)
 
-    def observed(self, registrar: Registrar, subject: Subject, axes: tuple) -> dict[str, Any]:
-        """Return the explainer's view of a candidate, and the perturbations applied to it."""
+    def observed(self, registrar: Registrar, subject: Subject, axes: tuple, most: int | None = None) -> dict[str, Any]:
+        """Return the explainer's view of a candidate, by so many runs at most, and what was applied to it."""
         candidate = registrar.candidate
-        xi_n_6 = self._twists(axes, "observed starts")
+        xi_n_6 = self._twists(axes, "observed starts")[:most]
         xi_n_6[0] = 0
         causes = candidate.present
         runs = registrar.run(causes, xi_n_6)

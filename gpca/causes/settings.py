@@ -97,6 +97,7 @@ class Limits:
     nominal: Positive = 0.02  # mean error below which nothing is wrong
     failed: Positive = 0.03  # mean error above which a registration has failed: the config's success.error
     cause: Positive = 0.01  # part of the error above which a concept is one of the causes
+    margin: Share = 0.0  # by which the part of a failure's dominant cause exceeds the next one, at least
     clean: OpenShare = 0.95  # of the clean pairs whose uncertainty is no larger than a nominal registration's may be
 
     def __post_init__(self) -> None:

@@ -40,7 +40,8 @@ def test_what_is_accepted_gives_nothing_away(tmp_path):
     fit(*candidates(2000, random)).to_csv(tmp_path / "matching.csv", index=False)
     matching = Matching.load(tmp_path / "matching.csv")
     numbers_N_F, cause_N = candidates(4000, random)
-    acceptance_N = np.array([matching.acceptance(*each) for each in zip(numbers_N_F, cause_N, strict=True)])
+    drawn = zip(numbers_N_F, cause_N, strict=True)
+    acceptance_N = np.array([matching.acceptances(numbers_F)[cause] for numbers_F, cause in drawn])
     accepted_N = random.random(len(cause_N)) < acceptance_N
     assert known(numbers_N_F, cause_N) > 0.6
     assert known(numbers_N_F[accepted_N], cause_N[accepted_N]) < 0.4
@@ -51,8 +52,8 @@ def test_what_is_accepted_gives_nothing_away(tmp_path):
 
 def test_candidates_that_give_their_cause_away_are_refused_and_counted(four, monkeypatch):
     class Never:
-        def acceptance(self, numbers_10, cause):
-            return 0.0 if cause == "pose" else 1.0
+        def acceptances(self, numbers_10):
+            return {"noise": 1.0, "pose": 0.0, "overlap": 1.0}
 
     monkeypatch.setattr(drawing.Matching, "load", classmethod(lambda cls: Never()))
     settings = CauseSettings(**FEW_CAUSES | {"matched": True, "candidates": 3})
@@ -64,3 +65,20 @@ def test_candidates_that_give_their_cause_away_are_refused_and_counted(four, mon
     for (_, _, group, _, kept), count in made.tally.items():
         counted[group, kept] += count
     assert counted[f"pose{GIVEN_AWAY}", False] and not counted["pose", True] and counted["overlap", True]
+
+
+def test_what_no_cause_would_let_pass_is_not_measured(four, monkeypatch):
+    monkeypatch.setattr(drawing.Matching, "acceptances", lambda self, numbers_10: dict.fromkeys(CONCEPTS, 0.0))
+    monkeypatch.setattr(drawing.Measuring, "truth", None)
+    made = drawing._Drawing(four, "four", 100, settings := CauseSettings(**FEW_CAUSES | {"matched": True}))
+    assert not made.up_to(12, "train", drawing.Quotas(settings.train, settings))
+    assert {group for _, _, group, _, _ in made.tally} <= {f"any{GIVEN_AWAY}", "any", "no correspondences"}
+
+
+def test_a_failure_has_one_cause_that_adds_more_than_the_margin(four):
+    limits = FEW_CAUSES.get("limits", {}) | {"margin": 0.05}
+    made = drawing._Drawing(four, "four", 100, settings := CauseSettings.from_dict(FEW_CAUSES | {"limits": limits}))
+    records = made.up_to(60, "train", drawing.Quotas(settings.train, settings))
+    margins = [each["truth"].margin[0] for each in records if each["truth"].state[0] == "failed"]
+    assert margins and min(margins) >= 0.05
+    assert any(group.endswith(drawing.TIED) and not kept for _, _, group, _, kept in made.tally)
