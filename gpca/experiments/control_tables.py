@@ -117,9 +117,9 @@ def table10_controls(run: Run, intervals):
         "under the same control; lead: minus that of the best other explainer; both on the same draws, so that it is "
         "better where the interval is above 0. Reads: what an explainer sees of a registration. ICP calls: runs "
         "beyond the one that it explains.",
-        "Hard: samples of unseen objects with one to three perturbations, labeled with the one that adds most to "
-        "the error by counterfactuals. No start is right, no sensor free of noise, no surface whole, and the "
-        "number of points tells nothing. Guessing is right in 33.3 %."
+        "Hard: samples of unseen objects with all perturbations, labeled with the one that adds most to the error by "
+        "counterfactuals, and drawn so that ten trivial numbers know nothing of it. What reads no embedding learns "
+        "from all sources, but from no family that is tested. Guessing is right in 33.3 %."
         + rule_near_chance(intervals, run.sources, table=HARD, metric="accuracy", against=""),
         "AUROC: how well the entropy of the scores separates wrong from right answers; in brackets how many of the "
         "test samples are wrong, and a dash where none is. Elsewhere a dash marks a head that is trained with the "

@@ -85,6 +85,10 @@ def _reenacted(plan: Plan) -> bool:
     return any(explainer_entry(name).reads == REENACTED for name in plan.config["controls"]["explainers"])
 
 
+def _of_all(file: str) -> list[str]:
+    return [file.replace("{source}", "{*source}")]
+
+
 def _other_sources(plan: Plan, wildcards: Wildcards) -> list[str]:
     return [name for name in plan.names["transfer_source"] if name != wildcards.source]
 
@@ -145,9 +149,9 @@ EXPLAIN = Step(
         "other_registrations": lambda plan, wildcards: [
             f"registrations/{name}/seed{{seed}}.npz" for name in _other_sources(plan, wildcards)
         ],
-        "hard": lambda plan, wildcards: [HARD_FILE] if HARD in _controls_of(plan, wildcards)[0] else [],
-        "hard_reenactments": lambda plan, wildcards: (
-            [HARD_REENACTED] if HARD in _controls_of(plan, wildcards)[0] and _reenacted(plan) else []
+        "all_hard": lambda plan, wildcards: _of_all(HARD_FILE) if HARD in _controls_of(plan, wildcards)[0] else [],
+        "all_hard_reenactments": lambda plan, wildcards: (
+            _of_all(HARD_REENACTED) if HARD in _controls_of(plan, wildcards)[0] and _reenacted(plan) else []
         ),
         "encoder": "encoders/{source}/{control_embedding}/seed{seed}.pt",
         "embeddings": "embeddings/{source}/{control_embedding}/none/seed{seed}.npz",

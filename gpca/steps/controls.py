@@ -2,10 +2,12 @@
 
 import sys
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import reduce
+from itertools import zip_longest
+from pathlib import Path
 from time import perf_counter
 
 import numpy as np
@@ -13,9 +15,10 @@ import pandas as pd
 
 from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import prediction_frame
+from gpca.causes.training import joined_without
 from gpca.classifier.scores import Attribution
 from gpca.encoders.registry import EncoderSettings
-from gpca.explainers.interface import BARE, REENACTED, Describing, Encoding, ExplainerEntry, answer_of
+from gpca.explainers.interface import BARE, EMBEDDINGS, REENACTED, Describing, Encoding, ExplainerEntry, answer_of
 from gpca.explainers.registry import Embed, described_for, make_rivals
 from gpca.io.csv_file import write_csv
 from gpca.jobs.job import Job
@@ -47,16 +50,15 @@ def explain(job: Job) -> None:
     others = dict(zip(job.others, job.other_registrations, strict=True))
     axes = (job.source, job.seed)
     inputs = [job.registrations, job.encoder, job.embeddings]
-    inputs += [*retrained.values(), *others.values(), *job.get("hard", []), *job.get("hard_reenactments", [])]
+    inputs += [*retrained.values(), *others.values(), *job.get("all_hard", []), *job.get("all_hard_reenactments", [])]
     with record_provenance([job.predictions, job.timings], inputs, job.settings, seed=job.seed):
         registrations = Registrations.load(job.registrations, axes)
-        hard = next((Registrations.load(path, axes) for path in job.get("hard", [])), None)
+        all_hard = read_hard(job.get("all_hard", []), job.get("all_hard_reenactments", []), job.seed)
         embeddings = {PAPER: read_embedding(job.embeddings, registrations, logits=True)}
         for control, path in retrained.items():
-            if control == HARD and hard:
-                embeddings[control] = read_embedding(path, hard, logits=True)
-                for enacted in job.get("hard_reenactments", []):
-                    embeddings[control] |= dict(with_what_it_reads(hard, REENACTED, enacted).attached)
+            if control == HARD:
+                hard = all_hard[job.source]
+                embeddings[control] = {**hard.attached, **read_embedding(path, hard, logits=True)}
             elif not samples.left_out(control, registrations, settings, encoder.backbone):
                 changed = samples.variant(control, registrations, *axes, settings, icp)
                 embeddings[control] = read_embedding(path, changed, logits=True)
@@ -68,13 +70,22 @@ def explain(job: Job) -> None:
             rivals,
             embedding_by(load_model(job.encoder, encoder, axes=axes), job.seed, encoder),
             embeddings,
-            hard,
+            all_hard.pop(job.source, None),
+            list(all_hard.values()),
         )
         rows = experiment.run(
             registrations, {name: Registrations.load(path, (name, job.seed)) for name, path in others.items()}
         )
         write_csv(job.predictions, rows)
         write_csv(job.timings, experiment.costs.rows())
+
+
+def read_hard(paths: Sequence[Path], reenactments: Sequence[Path], seed: int) -> dict[str, Registrations]:
+    """Return hard samples by source, with their re-enactments where files of these are given."""
+    return {
+        path.parent.name: with_what_it_reads(Registrations.load(path, (path.parent.name, seed)), REENACTED, enacted)
+        for path, enacted in zip_longest(paths, reenactments)
+    }
 
 
 @dataclass
@@ -115,6 +126,7 @@ class ControlRun:
         embed: registrations and the name of their source -> embeddings and head's logits by the paper's encoder.
         embeddings: ``embedding`` and ``head_logits`` by the paper's encoder, and by that of each control that has one.
         hard: the samples of that control, if it is among them.
+        other_hard: those of the other sources, whose training samples are learned from too.
     """
 
     source: str
@@ -126,6 +138,7 @@ class ControlRun:
     embed: Embed
     embeddings: Mapping[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
     hard: Registrations | None = None
+    other_hard: Sequence[Registrations] = ()
     costs: Costs = field(default_factory=Costs)
 
     def run(self, registrations: Registrations, others: Mapping[str, Registrations]) -> pd.DataFrame:
@@ -175,16 +188,16 @@ class ControlRun:
         assert self.hard is not None
         changed = self._changed(HARD, self.hard, {})
         explainer, test = self.rivals[name].made(), changed.subset(changed.rows("test"))
-        explainer.fit(changed.subset(changed.rows("train")))
+        explainer.fit(_learned_from(self.rivals[name], changed.subset(changed.rows("train"))))
         attribution = answer_of(explainer, test.without_labels())
         return attribution, float(attribution.seconds_N.mean())
 
     def _changed(self, control: str, plain: Registrations, embeds: Mapping[str, Attach]) -> Registrations:
         """Registrations under a control, with all that explainers read attached."""
         if control == HARD and self.hard is not None:
-            changed = self.hard
-        else:
-            changed = samples.variant(control, plain, self.source, self.seed, self.settings, self.uncertainty.icp)
+            changed = self._described(self._with_others(self.hard), self.source)
+            return _attached(self._learned(control, changed), changed)
+        changed = samples.variant(control, plain, self.source, self.seed, self.settings, self.uncertainty.icp)
         if control == UNSEEN:  # the measurements of each stay
             changed = replace(changed, attached={**changed.attached, **self.embeddings[control]})
         elif control in RETRAINED:
@@ -192,6 +205,21 @@ class ControlRun:
         elif control == "reversed":
             return _attached(embeds, self._described(self._embedded(changed, self.source), self.source))
         return _attached(self._learned(control, changed), changed) if control in RETRAINED else changed
+
+    def _with_others(self, hard: Registrations) -> Registrations:
+        """Join hard samples with those that other sources learn from, but of no family that is tested.
+
+        The others have no embedding, which would be by another encoder: it is NaN.
+        """
+        own = replace(hard, attached={**hard.attached, **self.embeddings[HARD]})
+        if not self.other_hard:
+            return own
+        test, parts = own.subset(own.rows("test")), [own.subset(own.rows("train"))]
+        for other in self.other_hard:
+            train = other.subset(other.rows("train"))
+            unknown = {name: np.full((len(train), *own_S.shape[1:]), np.nan) for name, own_S in own.attached.items()}
+            parts.append(replace(train, attached={**unknown, **train.attached}))
+        return Registrations.joined([joined_without(test.cluster, parts), test])
 
     def _learned(self, control: str, registrations: Registrations) -> dict[str, Attach]:
         """Functions that attach embeddings by the rivals' encoders, trained on the training samples."""
@@ -245,7 +273,7 @@ class ControlRun:
                 if control != HARD and rival.reads == REENACTED:
                     continue
                 with self.costs.count_learning(control, name):
-                    explainer.fit(train)
+                    explainer.fit(_learned_from(rival, train))
                 for (name_of_test, source), test in asked.items():
                     attribution = answer_of(explainer, test.without_labels())
                     if name_of_test == PAPER:
@@ -254,6 +282,13 @@ class ControlRun:
                     for i, entry in enumerate(zip(LABELS, (name_of_test, source, name), strict=True)):
                         frame.insert(i, *entry)
                     yield frame
+
+
+def _learned_from(rival: ExplainerEntry, train: Registrations) -> Registrations:
+    """Return the training samples for an explainer: where it reads embeddings, those that have one."""
+    if rival.reads != EMBEDDINGS:
+        return train
+    return train.subset(np.flatnonzero(np.isfinite(train.embedding).all(axis=1)))
 
 
 def _attached(embeds: Mapping[str, Attach], registrations: Registrations) -> Registrations:

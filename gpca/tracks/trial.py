@@ -29,8 +29,8 @@ from gpca.process.progress import progress
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import read_settings
 from gpca.steps.control_samples import HARD, HARD_REENACTMENTS, ControlSettings
-from gpca.steps.controls import ControlRun
-from gpca.steps.diagnosis import DESCRIBED, explained, frames_to_explain, with_what_it_reads
+from gpca.steps.controls import ControlRun, read_hard
+from gpca.steps.diagnosis import DESCRIBED, explained, frames_to_explain
 from gpca.steps.learning_curve import CurveSettings
 from gpca.steps.scan_causes import diagnose as diagnose_scans
 from gpca.tracks.published import NOTHING_NAMED, Method, label_numbers, predicted
@@ -163,15 +163,15 @@ def _causes(trial: MethodTrial, source: str, seed: int) -> PartPredictions:
 
 def _hard(trial: MethodTrial, source: str, seed: int) -> PartPredictions:
     samples, config = trial.samples, trial.samples.config
-    [path] = samples.files([samples.track.file(source, seed)])
-    hard = Registrations.load(path, (source, seed))
-    embeddings: dict[str, np.ndarray] = {}
-    if trial.entry.reads == EMBEDDINGS:
+    reads = trial.entry.reads
+    sources = [source] if reads == EMBEDDINGS else dict.fromkeys(part for part, _, _ in samples.parts())
+    paths = samples.files([samples.track.file(each, seed) for each in sources])
+    enacted = [f"{HARD_REENACTMENTS}/{each}/seed{seed}.npz" for each in sources] if reads == REENACTED else []
+    all_hard = read_hard(paths, samples.files(enacted), seed)
+    hard, embeddings = all_hard.pop(source), {}
+    if reads == EMBEDDINGS:
         [read] = samples.files([f"control_embeddings/{HARD}/{source}/seed{seed}.npz"])
         embeddings = read_embedding(read, hard, logits=True)
-    elif trial.entry.reads == REENACTED:
-        [read] = samples.files([f"{HARD_REENACTMENTS}/{source}/seed{seed}.npz"])
-        embeddings = dict(with_what_it_reads(hard, REENACTED, read).attached)
     controls = {key: value for key, value in config["controls"].items() if key not in ("explainers", "hard")}
     runs = {key: value for key, value in config["uncertainty"].get("removal", {}).items() if key != "samples"}
     run = ControlRun(
@@ -184,6 +184,7 @@ def _hard(trial: MethodTrial, source: str, seed: int) -> PartPredictions:
         embed=_never,
         embeddings={HARD: embeddings},
         hard=hard,
+        other_hard=list(all_hard.values()),
     )
     attribution, seconds = run.explain_hard(trial.name)
     return PartPredictions.of(attribution, samples.track.labels, seconds)

@@ -51,6 +51,27 @@ def test_hard_samples_are_learned_from_and_asked_about_as_they_are(six):
     assert share_right(found, control="hard", explainer="nearest") == 1
 
 
+def test_hard_samples_of_other_sources_are_learned_from_but_no_embeddings_and_no_tested_family(six):
+    tested = np.unique(six.cluster)[:2]
+    hard = replace(six, split=np.where(np.isin(six.cluster, tested), "test", "train"))
+    other = replace(hard, split=np.full(len(six), "train"), attached={})
+    learned = {}
+
+    class Learner(Head):
+        def fit(self, registrations):
+            learned[self.name] = registrations
+
+    rivals = {
+        reads: rival(type(reads, (Learner,), {"name": reads}), reads) for reads in ("embeddings", "registrations")
+    }
+    made = experiment(six, "hard", embeddings={"hard": attached(hard)}, rivals=rivals)
+    replace(made, hard=hard, other_hard=[other]).explain_hard("embeddings")
+    replace(made, hard=hard, other_hard=[other]).explain_hard("registrations")
+    own = np.isin(hard.cluster, tested, invert=True).sum()
+    assert len(learned["embeddings"]) == own and len(learned["registrations"]) == 2 * own
+    assert not np.isin(learned["registrations"].cluster, tested).any()
+
+
 def test_what_a_source_does_not_admit_is_left_out_and_named(registrations, capsys):
     found = experiment(registrations, "unseen_objects", "hard", "shuffled", "transfer").run(registrations, {})
     assert set(found["control"]) == {"paper", "shuffled"}
