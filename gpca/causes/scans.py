@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -247,6 +247,21 @@ def measure_scans(
     columns |= {name: [getattr(each.pair, name) for each in scans_S] for name in ("kind", "overlap")}
     columns |= {"start": [start.kind for start in measured], "init_from": [start.init_from for start in measured]}
     columns |= {"times": [start.times for start in measured], "sensor_noise": [each.sensor_noise for each in scans_S]}
+
+    def one_sided(number: int) -> str:
+        """Return the dominant cause where overlap is completed by cropping the source alone."""
+        each = case(number)
+        candidate, subject = each.make()
+        assert isinstance(candidate, ScanCandidate)
+        whole = Registrar(replace(candidate, model_common=np.arange(len(candidate.model))), settings, misses=True)
+        try:
+            return str(measuring.truth(measuring.counterfactuals(whole, subject, each.axes, "starts")).dominant[0])
+        except Unmeasurable:
+            return ""
+
+    natural = [start.kind == GLOBAL and not start.times for start in measured]
+    numbered = zip(registrations.sample.tolist(), natural, strict=True)
+    found["dominant_one_sided"] = [one_sided(number) if is_natural else "" for number, is_natural in numbered]
     factors = {"error_factor": [each.error_factor for each in scans_S]}
     return causes, pd.DataFrame({"sample": registrations.sample, **columns, **severities, **found, **factors})
 

@@ -24,6 +24,7 @@ from gpca.seeds import generator
 REPEATS = 500
 LEVEL = 0.95
 FEWEST_CLUSTERS = 5  # below which no difference is shown
+FEWEST_FAILURES = 30  # or other samples of a kind, below which nothing is concluded
 NO_WIDTH = 1e-9  # an interval this narrow differs from a point by rounding alone
 ANYTHING = (-np.inf, np.inf)  # limits of a value that has none
 TRIVIAL = (

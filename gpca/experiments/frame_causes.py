@@ -18,7 +18,7 @@ from gpca.declarations.result import Frame, Paths, numbers, table
 from gpca.declarations.step import Plan, Step
 from gpca.encoders.registry import encoder_module
 from gpca.errors import InputError
-from gpca.evaluation.intervals import REPEATS, Clustered, pigeonhole_weights
+from gpca.evaluation.intervals import FEWEST_FAILURES, REPEATS, Clustered, pigeonhole_weights
 from gpca.evaluation.measures import ALL, intervals
 from gpca.experiments import cause_tables as tables
 from gpca.experiments.diagnosis import FURTHER, TABLE, cause_costs, cause_titles, compared_samples
@@ -45,7 +45,6 @@ TRUTH = "truth"  # in the place of an explainer: how many there are of a kind, `
 PSEUDO = "pseudo_truth"  # in the place of a kind of start: those whose true pose was made by ICP
 FAILED_BY = "failed_"  # and a method: columns of the samples
 COUNTED = ("starts", "instances", "scenes", "objects", *LABELS, BORDERLINE, GEOMETRY, "missed")
-FEWEST_FAILURES = 30  # of a kind, below which nothing is concluded from it
 
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from gpca.alignment.methods.registry import method_module
 from gpca.attribution.predictions import read_predictions
 from gpca.causes import judged as answers
 from gpca.causes.dataset import LABELS, Causes
-from gpca.causes.scans import KINDS
+from gpca.causes.scans import GLOBAL, KINDS
 from gpca.causes.settings import SCANS, ScanSamples
 from gpca.causes.truth import BORDERLINE, GEOMETRY
 from gpca.declarations.experiment import Experiment, LeftOut, Names
@@ -25,7 +25,7 @@ from gpca.declarations.result import Frame, Paths, numbers
 from gpca.declarations.step import Step
 from gpca.encoders.registry import encoder_module
 from gpca.errors import InputError, with_key
-from gpca.evaluation.intervals import TRIVIAL, best_of, corrected, interval, pigeonhole_weights
+from gpca.evaluation.intervals import TRIVIAL, best_of, corrected, interval, pigeonhole_weights, weighted_mean
 from gpca.evaluation.measures import ALL, POOLED
 from gpca.experiments.frame_causes import count_ends, ends_of
 from gpca.experiments.scans import EACH_SET, ChoiceSettings, files_of_set, place_of_set
@@ -156,13 +156,20 @@ DIAGNOSE = Step(
     where={"seed": "scan_seed"},
 )
 
+SHARES = {  # of the failed by each cause -> where it stands, and whether a pair counts as often as it stands for
+    "share": ("end", False),
+    "share_weighted": ("end", True),
+    "share_one_sided": ("dominant_one_sided", True),
+}
 SAMPLE_COLUMNS = ("sample", "cluster", "overlap", "start", "times", "missed")
+WEIGHED = ("stands_for", "dominant_one_sided")
 COLUMNS = (
     *("source", "condition", "stratum", "learned", "method", "metric", "samples", "clusters", "seeds"),
     *("value", "low", "high", "gate", "difference", "difference_low", "difference_high"),
 )
 NUMBERS = tuple(name for name in COLUMNS[6:] if name != "gate")
 TRUTH = "truth"  # instead of an explainer, in rows of counts, ``count_<kind>``
+FAILED = "failed"  # the same of shares, ``share_<cause>``, of the failed whose start a global method found
 EVERY = "all"  # strata
 NATURAL, ADDED = "natural", "noise_added"  # conditions of what is measured; counts are of kinds of start as well
 COUNTED = ("registrations", "pairs", "clusters", *LABELS, BORDERLINE, GEOMETRY, "missed")
@@ -208,6 +215,8 @@ def collect(run: Run, causes_files: Paths, sample_files: Paths, prediction_files
                     sizes = (len(chosen), counts["clusters"], chosen["seed"].nunique())
                     nothing = (np.nan, np.nan, *NO_LEAD)
                     rows += [(*place, f"count_{kind}", *sizes, float(counts[kind]), *nothing) for kind in COUNTED]
+            if condition == f"{NATURAL}_{GLOBAL}" and source != POOLED:
+                rows += _shares((source, condition, EVERY, SCANS, FAILED), seen[mask_N & seen["end"].isin(CONCEPTS)])
             if condition in (NATURAL, ADDED) and mask_N.any():
                 parts = {key: every.subset(mask_N) for key, every in judged.items()}
                 rows += _measures((source, condition, EVERY), parts, seen["cluster"][mask_N].to_numpy(str))
@@ -222,6 +231,17 @@ def collect(run: Run, causes_files: Paths, sample_files: Paths, prediction_files
             corrected(value_M, low_M, high_M, clusters_M, reach=reach.get(key, np.inf))
         )
     return collected
+
+
+def _shares(place: tuple, failed: Frame) -> Iterator[tuple]:
+    """Shares of the failed by each cause: as drawn, and as the overlaps of the data set are."""
+    drawn_B_N = pigeonhole_weights(generator("scan shares", *place), failed["seed"].to_numpy(), failed["cluster"])
+    weights_B_N = np.vstack([np.ones(len(failed)), drawn_B_N])
+    sizes = len(failed), failed["cluster"].nunique(), failed["seed"].nunique()
+    for (name, (column, weighted)), concept in product(SHARES.items(), CONCEPTS):
+        weight_N = failed["stands_for"].to_numpy() if weighted else 1.0
+        share_B = weighted_mean(failed[column] == concept, weights_B_N * weight_N)
+        yield (*place, f"{name}_{concept}", *sizes, *interval(share_B, drawn_B_N), *NO_LEAD)
 
 
 def read_scan_causes(path: str | Path) -> Frame:
@@ -243,14 +263,14 @@ def _read(causes_files, sample_files, prediction_files) -> tuple[Frame, dict[tup
         source, seed = Path(causes_file).parent.name, seed_of_file(causes_file)
         causes = Causes.load(causes_file, (source, seed))
         same = causes.registrations.arrays, "causes or the predictions", ("sample",)
-        samples = read_csv(sample_file, SAMPLE_COLUMNS, others=ANY)[list(SAMPLE_COLUMNS)]
+        samples = read_csv(sample_file, (*SAMPLE_COLUMNS, *WEIGHED), others=ANY)[[*SAMPLE_COLUMNS, *WEIGHED]]
         require_same_samples(sample_file, samples, *same)
         for key, rows in predicted[seed].groupby(["learned", "explainer"], sort=False) if seed in predicted else ():
             rows = rows[rows["scans"] == source]
             require_same_samples(causes_file, rows, *same)
             judged.setdefault(key, []).append(answers.judged_by(rows, causes, seed))
         judged.setdefault(("", answers.CEILING), []).append(answers.ceiling_of(causes, seed))
-        read = {name: number_column(sample_file, samples, name) for name in ("overlap", "times")}
+        read = {name: number_column(sample_file, samples, name) for name in ("overlap", "times", "stands_for")}
         pair = [f"{source} {name}" for name in causes.registrations.object_name]
         seen.append(samples.assign(**read, scans=source, seed=seed, end=ends_of(causes.truth), pair=pair))
     if not seen:

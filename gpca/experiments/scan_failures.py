@@ -12,11 +12,11 @@ from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
 from gpca.declarations.plan import Run, plain
 from gpca.declarations.result import figure, table
 from gpca.errors import InputError
-from gpca.evaluation.intervals import REPEATS
+from gpca.evaluation.intervals import FEWEST_CLUSTERS, FEWEST_FAILURES, REPEATS
 from gpca.evaluation.measures import POOLED
 from gpca.experiments import cause_tables as tables
 from gpca.experiments import scan_causes as scans
-from gpca.experiments.frame_causes import ENDS, FEWEST_FAILURES, MISSED_NOTE, counts_in, sheet_of_counts
+from gpca.experiments.frame_causes import ENDS, MISSED_NOTE, counts_in, sheet_of_counts
 from gpca.experiments.scan_causes import ADDED, CAUSES, EVERY, NATURAL, TRUTH
 from gpca.experiments.scans import titles_of_scans
 from gpca.explainers.interface import icp_calls
@@ -151,12 +151,40 @@ def table18_scan_counts(run: Run, measured):
     heads = {"scans": "Scans", "start": "Start", "overlap": "Overlap"}
     titles = {"registrations": "Registrations", "pairs": "Pairs", "clusters": "Scenes"} | ENDS
     notes = (
+        *filter(None, (shares_in_words(measured, *named) for named in titles_of_scans(run.config).items())),
         "By a cause: it adds most to the error. Without a cause: off even when started from the truth and cropped "
         "to what both scans see; not among the failed. Noise is a cause only where it was added.",
         MISSED_NOTE,
     )
     caption = "What became of registrations of scans to scans, and by which cause they failed"
     return sheet_of_counts("table18_scan_counts", heads, rows, titles, measured).table(caption, "count", notes)
+
+
+SHARES_IN_WORDS = {
+    "share": "as drawn",
+    "share_weighted": "as the data set's pairs overlap",
+    "share_one_sided": "the same with only the source cropped, where overlap is made whole",
+}
+
+
+def shares_in_words(measured, name: str, title: str) -> str:
+    """Sentence on the causes of failures from a global method's starts; nothing is concluded from few."""
+    rows = where(measured, {"source": name, "condition": BY_METHOD, "method": scans.FAILED}).set_index("metric")
+    if not len(rows):
+        return ""
+    count, clusters = (int(rows[column].iloc[0]) for column in ("samples", "clusters"))
+    counted = f"{title}, from the global method's pose: {plural(count, 'failure')} in {plural(clusters, 'scene')}"
+    if count < FEWEST_FAILURES or clusters < FEWEST_CLUSTERS:
+        return f"{counted}: too few to conclude from."
+    cells = {kind: interval_cell(rows.loc[f"{kind}_overlap"]) for kind in SHARES_IN_WORDS}
+    return (
+        f"{counted}; by missing overlap "
+        + "; ".join(
+            f"{SHARES_IN_WORDS[kind]} {cell.mean:.0f} % ({cell.bounds[0]:.0f} to {cell.bounds[1]:.0f})"
+            for kind, cell in cells.items()
+        )
+        + "."
+    )
 
 
 @figure(

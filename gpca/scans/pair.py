@@ -37,6 +37,7 @@ class ScanPair:
     source_viewpoint_3: np.ndarray | None = None  # of the sensor, to which normals point; None where unknown
     target_viewpoint_3: np.ndarray | None = None
     family: str = ""  # of scenes that are alike, as two data sets of one object
+    stands_for: float = 1.0  # pairs of its data set, from which it is drawn
 
     def __post_init__(self) -> None:
         for name, points in ((self.source_name, self.source_N_3), (self.target_name, self.target_M_3)):

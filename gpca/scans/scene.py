@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations, pairwise
 from pathlib import Path
@@ -120,7 +120,8 @@ def choose_pairs(scenes: Iterable[ScannedScene], edges: Sequence[float], most: i
                 by_stratum[name].append(known)
         for name, candidates in by_stratum.items():
             order = generator(*axes, scene.name, name, "pairs").permutation(len(candidates))
-            chosen[name] += [scene.pair(candidates[i]) for i in sorted(order[:most])]
+            share = max(1.0, len(candidates) / most)
+            chosen[name] += [replace(scene.pair(candidates[i]), stands_for=share) for i in sorted(order[:most])]
     return [pair for pairs in chosen.values() for pair in pairs]
 
 

@@ -56,6 +56,7 @@ def measure(job: Job) -> None:
         success = read_settings(ScanSuccess, section.get("success") or {})
         causes, samples = measure_scans(pairs, starts, *axes, truth, success, own.points)
         causes.save(job.scan_causes)
+        samples["stands_for"] = samples["pair"].map({pair.name: pair.stands_for for pair in chosen})
         write_csv(job.samples, samples)
         descriptors = DescriptorSettings(**job.section("descriptors"))
         describe_all(causes, *axes, descriptors, truth.icp)[0].save(job.descriptors)

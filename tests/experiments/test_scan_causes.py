@@ -15,7 +15,13 @@ from gpca.errors import InputError
 from gpca.evaluation.measures import POOLED
 from gpca.experiments import scan_causes
 from gpca.experiments.scan_causes import ADDED, EVERY, NATURAL, collect, read_scan_causes
-from gpca.experiments.scan_failures import counts_of, scan_failures, table18_scan_causes, table18_scan_counts
+from gpca.experiments.scan_failures import (
+    counts_of,
+    scan_failures,
+    shares_in_words,
+    table18_scan_causes,
+    table18_scan_counts,
+)
 from gpca.io.csv_file import write_csv
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.tables.cells import rows_where
@@ -23,6 +29,7 @@ from tests.experiments.runs import run_with
 
 KNOWING, GUESSING = "pair_forest", "chance"  # explainers under whose names made-up answers stand
 EXPLAINERS = (KNOWING, GUESSING, "gate_rmse")
+STANDS_FOR = [5.0, 1.0, 1.0, 1.0, 2.0]  # pairs of a data set
 TITLES = {"rooms": "Rooms", "things": "Things"}
 
 
@@ -67,6 +74,7 @@ def files(causes, tmp_path_factory):
         start = np.resize(["ladder", "global", "ladder"], n)
         told = {"sample": own.registrations.sample, "cluster": own.registrations.cluster, "start": start}
         told |= {"overlap": np.resize([0.2, 0.7], n), "times": np.resize([0.0, 0.0, 0.0, 2.0], n), "missed": False}
+        told |= {"stands_for": np.resize(STANDS_FOR, n), "dominant_one_sided": "pose"}
         write_csv(given["sample_files"][-1], pd.DataFrame(told))
         for (learned, explainer), attribution in answers(own, random).items():
             frame = prediction_frame(own.registrations, attribution)
@@ -106,6 +114,20 @@ def test_a_gate_names_no_cause_and_the_ceiling_has_no_rival(measured):
     assert set(gate["metric"]) == {"test_samples", "auroc_failed", "false_alarm_rate", "state_accuracy"}
     ceiling = rows_where(measured, method=CEILING)
     assert len(ceiling) and (ceiling["gate"] == "").all() and ceiling["difference"].isna().all()
+
+
+def test_failures_of_a_global_methods_starts_count_as_often_as_their_pairs_stand_for(measured, causes):
+    label = labels_of(causes.subset(causes.rows("test")).truth)
+    number = np.arange(len(label))
+    failed = (number % 3 == 1) & (number % 4 != 3) & np.isin(label, CONCEPTS)
+    of = {"source": "rooms", "condition": "natural_global", "method": "failed"}
+    for concept in CONCEPTS:
+        shares = [value(measured, metric=f"{name}_{concept}", **of)["value"] for name in scan_causes.SHARES]
+        weights = [np.ones(len(label)), np.resize(STANDS_FOR, len(label))]
+        expected = [np.average(label[failed] == concept, weights=weight_N[failed]) for weight_N in weights]
+        assert shares == pytest.approx([*expected, float(concept == "pose")])
+    told = shares_in_words(measured, "rooms", "Rooms")
+    assert told.startswith("Rooms, from the global method's pose:") and told.endswith("too few to conclude from.")
 
 
 def test_counts_are_of_data_sets_conditions_and_strata(measured, causes):
