@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import csv
+import math
 import re
 import shlex
 import sys
@@ -39,6 +40,7 @@ PASSAGE = re.compile(r"(?<=<!--begin )(\w+)-->\n(.*?)(?=<!--end \1-->)", re.DOTA
 CONDITION = re.compile(r"<!--if (\w+)-->")
 MARKER = re.compile(r"<!--(?:begin |if )?(\w+)-->")
 LINK = re.compile(r"\]\([^)\s]*results/reference/(\w+)/")
+NUMBER_OF_TEXT = re.compile(r"\[\[(.+?)\]\]")
 OF_SEVERAL_ROWS: dict[str, Callable] = {"min": min, "max": max, "mean": fmean}
 LINE = 120  # letters
 
@@ -109,9 +111,9 @@ def filled(text: str, definitions: dict, page: str, folder: Path) -> tuple[str, 
 
     def passage(match: re.Match) -> str:
         name, old = match.groups()
-        make = table if isinstance(definitions[name], dict) else value
-        new = make(definitions[name], folder)
-        new = f"\n{new if new.startswith('|') else textwrap.fill(new, LINE, break_on_hyphens=False)}\n\n"
+        new = passage_of(definitions[name], folder)
+        wrapped = textwrap.fill(new, LINE, break_on_hyphens=False, subsequent_indent="  " * new.startswith("- "))
+        new = f"\n{new if new.startswith('|') else wrapped}\n\n"
         if new != old:
             changes.append(f"{name}: written anew")
         return f"{name}-->\n{new}"
@@ -124,12 +126,42 @@ def no_longer_true(text: str, definitions: dict, folder: Path) -> list[str]:
     lines = []
     for name in CONDITION.findall(text):
         for comparison in definitions[name]:
-            with _named(comparison):
-                greater, word, less = re.split(r" (above|reaches) ", comparison)
-                difference = _difference(shlex.split(greater), folder) - _difference(shlex.split(less), folder)
-            if difference < 0 or (difference == 0 and word == "above"):
+            if not holds(comparison, folder):
                 lines.append(f"{name}: no longer holds ({comparison}); rewrite the sentence")
     return lines
+
+
+def holds(comparison: str, folder: Path) -> bool:
+    """Whether a comparison, X above Y or X reaches Y, is true of the reference."""
+    with _named(comparison):
+        greater, word, less = re.split(r" (above|reaches) ", comparison)
+        difference = _difference(shlex.split(greater), folder) - _difference(shlex.split(less), folder)
+    return difference > 0 or (difference == 0 and word == "reaches")
+
+
+def passage_of(definition: str | dict, folder: Path) -> str:
+    """Return the text of a longer passage: a table, a sentence chosen by the numbers, or what a file says."""
+    if isinstance(definition, str):
+        return value(definition, folder)
+    return table(definition, folder) if "head" in definition else sentence(definition, folder)
+
+
+def sentence(definition: dict, folder: Path) -> str:
+    """Return the first of the `cases` that holds, about the best of some rows."""
+    words, best = shlex.split(definition["of"]), -math.inf
+    for row, title in definition["best"].items():
+        rows, column = _matching([*words, f"explainer={row}"], folder)
+        if rows and (number := float(rows[0][column])) > best:
+            best, texts = number, {"BEST": row, "TITLE": title, "Title": title[0].upper() + title[1:]}
+    for case in definition["cases"]:
+        *comparisons, text = [_with(each, texts) for each in (*case.get("if", []), case["text"])]
+        if all(holds(comparison, folder) for comparison in comparisons):
+            return NUMBER_OF_TEXT.sub(lambda match: value(match[1], folder), text)
+    raise InputError(definition["of"], "no case holds", "end the cases with one without 'if'")
+
+
+def _with(text: str, words: dict[str, str]) -> str:
+    return re.sub("|".join(words), lambda match: words[match[0]], text)
 
 
 def table(definition: dict, folder: Path) -> str:

@@ -105,6 +105,25 @@ def test_a_sentence_stands_on_comparisons_with_the_reference(reference, comparis
 
 
 @pytest.mark.parametrize(
+    ("mine", "said"),
+    [
+        ("99.5", "- Mine is best: 99.5."),
+        ("98", "- A forest is best, not mine."),
+        ("-3", "- A forest is best, not mine."),
+    ],
+)
+def test_a_sentence_is_about_the_best_row_and_is_chosen_by_the_numbers(reference, mine, said):
+    (reference / "tables/own.csv").write_text(f"{TABLE}mine,own,{mine},8\n")
+    cases = [
+        {"if": ["own BEST above max own gpca|forest"], "text": "- Title is best: [[own BEST .1f]]."},
+        {"text": "- Title is best, not mine."},
+    ]
+    lead = {"of": "own", "best": {"own": "mine", "forest": "a forest", "lacking": "none"}, "cases": cases}
+    text, _ = fill.filled("<!--begin lead-->\n<!--end lead-->\n", {"lead": lead}, "page.md", reference)
+    assert text == f"<!--begin lead-->\n\n{said}\n\n<!--end lead-->\n"
+
+
+@pytest.mark.parametrize(
     ("page", "fault"),
     [
         (PAGE + "5<!--own_two-->", "marker 'own_two': is not defined"),

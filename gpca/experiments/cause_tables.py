@@ -15,6 +15,7 @@ from gpca.evaluation.measures import POOLED
 from gpca.experiments.cause_figures import draw_causes_example, draw_failures
 from gpca.experiments.confusions import draw_confusions
 from gpca.experiments.diagnosis import cause_costs, cause_titles
+from gpca.experiments.leads import lead
 from gpca.explainers.interface import WORDS
 from gpca.objects.entry import dataset_of
 from gpca.pairs.perturbation import CONCEPTS
@@ -146,6 +147,7 @@ def table9_causes(run: Run, intervals):
     heads = {"source": "Dataset", "explainer": "Explainer", "reads": "Reads"}
     sheet = Sheet("table9_causes", heads, rows, SHOWN, intervals, more=counts_and_calls(costs))
     notes = (
+        *filter(None, [lead(intervals, explainers)]),
         f"n: test samples that are judged, over {plural(sheet.seeds, 'seed')}; borderline ones are left "
         f"out. Of them, {counted}. In brackets: the 95 % interval of a bootstrap over objects "
         f"and seeds ({REPEATS} draws). Bold: best explainer on a dataset.",

@@ -20,6 +20,7 @@ from gpca.encoders.registry import NamedEncoder, require_backbone, require_draws
 from gpca.errors import InputError, with_key
 from gpca.evaluation.intervals import ANYTHING, TRIVIAL, Clustered
 from gpca.evaluation.measures import ALL, POOLED, Measure, Rivals, compared, intervals, tidy
+from gpca.experiments.leads import TRAINED, trained_rivals
 from gpca.explainers.interface import BARE, EMBEDDINGS, REENACTED, icp_calls
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module, explainers, require_settings
 from gpca.reenactment.settings import ReenactmentSettings
@@ -162,7 +163,8 @@ def collect(run: Run, prediction_files: Paths, causes_files: Paths) -> tuple[Fra
                     predicted = zip((*LABELS, ABSTAINED), counts, strict=True)
                     rows += [(PREDICTED_AS + label, true, count) for label, count in predicted]
         records += [(TABLE, source, explainer, metric, part, seed, float(value)) for metric, part, value in rows]
-    return tidy(records, "diagnoses"), compared_by_source(by_source(judged))
+    against = AGAINST | {TRAINED: trained_rivals}
+    return tidy(records, "diagnoses"), compared_by_source(by_source(judged), against=against)
 
 
 @numbers(
@@ -198,7 +200,7 @@ def by_source(judged: Mapping[tuple[str, str, int], Judged]) -> dict[str, dict[s
 
 
 # The ceiling is no rival, and none of it.
-AGAINST: Mapping[str, Rivals] = {
+AGAINST: dict[str, Rivals] = {
     "rival": lambda name, names: () if name == CEILING else [other for other in names if other != CEILING],
     "trivial": lambda name, names: () if name == CEILING else TRIVIAL,
 }

@@ -9,9 +9,12 @@ from gpca.active_learning.settings import JUDGED_SHARE, rare_setting
 from gpca.causes.judged import CEILING
 from gpca.evaluation.intervals import TRIVIAL
 from gpca.evaluation.measures import ALL, POOLED, read_clustered, read_metrics
+from gpca.experiments.leads import JUDGED, TRAINED, lead
+from gpca.experiments.shifts import MEAN, reached
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.io.frame import Frame, Series
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.reporting.tables.cells import rows_where
 from gpca.reporting.words import plural
 
 RULE = "rule"
@@ -28,10 +31,11 @@ class Finding(NamedTuple):
 
 
 class Titles(NamedTuple):
-    """Titles of explainers: of concepts with ``title`` and ``oracle``, and of causes."""
+    """Titles of explainers, of concepts with ``title`` and ``oracle``, and of causes; of shifts of the truth."""
 
     explainers: Mapping[str, Mapping]
     cause_explainers: Mapping[str, str]
+    shifts: Mapping[str, str]
     budget: int
 
 
@@ -40,6 +44,7 @@ def findings_of(folder: Path, titles: Titles, shown: Collection[str]) -> list[Fi
     readers: dict[str, tuple[Callable, Callable[[Frame, Titles], Iterator[Finding]]]] = {
         "attribution_intervals.csv": (read_clustered, _concepts),
         "cause_intervals.csv": (read_clustered, _causes),
+        "shifts.csv": (read_clustered, _shifts),
         "real_world_intervals.csv": (read_clustered, _frames),
         "active_learning.csv": (read_metrics, _labels),
         "recovery_intervals.csv": (read_clustered, _recovery),
@@ -95,7 +100,7 @@ def _causes(intervals: Frame, titles: Titles) -> Iterator[Finding]:
             text += f" {words['gpca']} has {_percent(rows.loc['gpca', 'value'])}."
         if CEILING in rows.index:
             text += f" The truth measured from other starts agrees in {_percent(rows.loc[CEILING, 'value'])}."
-        yield Finding(_percent(row["value"]), text, "table9_causes")
+        yield Finding(_percent(row["value"]), f"{lead(intervals, words)} {text}".lstrip(), "table9_causes")
     rows, trained = _pooled(intervals, titles, "regret")
     if trained and RULE in rows.index:
         best = min(trained, key=lambda name: rows.loc[name, "value"])
@@ -106,6 +111,14 @@ def _causes(intervals: Frame, titles: Titles) -> Iterator[Finding]:
             f"untrained rule leaves {_percent(rows.loc[RULE, 'value'])} ({_bounds(rows.loc[RULE])})."
         )
         yield Finding(left, text, "table9_causes")
+
+
+def _shifts(intervals: Frame, titles: Titles) -> Iterator[Finding]:
+    rows = rows_where(intervals, metric="balanced_accuracy", method=JUDGED, against=TRAINED, concept=MEAN)
+    if len(rows):
+        number = f"{100 * rows['value'].iloc[0]:+.0f} points"
+        verdict = reached(intervals, titles.shifts, titles.cause_explainers)
+        yield Finding(number, f"{verdict} The truth is generated there in other ways than is learned.", "table9_shift")
 
 
 def _pooled(intervals: Frame, titles: Titles, metric: str) -> tuple[Frame, list[str]]:

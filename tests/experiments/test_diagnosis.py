@@ -9,6 +9,7 @@ from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL
 from gpca.errors import InputError
 from gpca.evaluation.measures import POOLED, read_clustered, write_metrics
 from gpca.experiments import diagnosis
+from gpca.experiments.leads import trained_rivals
 from gpca.experiments.sample_strata import collect_strata, strata_of, table9_shown, table9_strata
 from tests.experiments.runs import run_with
 from tests.judged import random_judged, write_run
@@ -101,6 +102,18 @@ def test_the_gain_is_over_the_best_that_needs_no_training():
     assert 0 < gain["low"] < gain["value"] < gain["high"]
     assert [rows.loc[name, "trivial"]["other"] for name in ("rule", "chance")] == ["chance", "rule"]
     assert (CEILING, "trivial") not in rows.index
+
+
+def test_a_lead_is_over_the_best_that_is_trained_and_reads_no_reenactment():
+    skills = {"reenact": 1.0, "reenact_committee": 3.0, "pair_forest": 0.3, "committee_further": 2.0, "rule": 0.1}
+    judged = {name: random_judged(200, skill=skill) for name, skill in skills.items()}
+    rows = diagnosis.compared_by_source(
+        {"tiny": judged | {CEILING: judged["rule"]}}, against={"trained": trained_rivals}
+    )
+    rows = rows[rows["metric"] == "balanced_accuracy"].set_index(["method", "against"])
+    assert rows.loc["reenact", "trained"]["other"] == "committee_further"
+    assert rows.loc["reenact", "trained"]["high"] < 0 < rows.loc["reenact_committee", "trained"]["value"]
+    assert (CEILING, "trained") not in rows.index
 
 
 def test_a_run_is_collected_written_and_read(causes, tmp_path):

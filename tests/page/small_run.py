@@ -61,7 +61,7 @@ def run_of(folder, **changes):
             }
         },
         "causes": {},
-        "titles": Titles({"gpca": {"title": "GP-CA", "oracle": False}}, {}, 3),
+        "titles": Titles({"gpca": {"title": "GP-CA", "oracle": False}}, {}, {}, 3),
         "reference": None,
         "config": {
             "run": "tiny",

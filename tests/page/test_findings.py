@@ -11,7 +11,9 @@ TITLES = Titles(
         name: {"title": name.upper(), "oracle": name == "shap_oracle"}
         for name in ("gpca_paper", "shap_additive", "forest", "shap_oracle", "rule")
     },
-    cause_explainers={"gpca": "GP-CA (aligned source)", "pair": "GP-CA on the pair", "rule": "Rule and gate"},
+    cause_explainers={"gpca": "GP-CA (aligned source)", "pair": "GP-CA on the pair", "rule": "Rule and gate"}
+    | {"reenact": "Re-enactment", "pair_committee": "Committee"},
+    shifts={"scaled": "Model scaled"},
     budget=3,
 )
 RESULTS = (
@@ -109,3 +111,38 @@ def test_what_a_run_has_not_is_not_spoken_of_and_a_damaged_file_is_named(folder)
     (folder / "recovery_intervals.csv").write_text("table\n1\n")
     with pytest.raises(InputError, match=r"recovery_intervals\.csv: column"):
         findings_of(folder, TITLES, RESULTS)
+
+
+def difference(method, other, part, samples, clusters, value, low, high):
+    keys = f"causes,pooled,{method},balanced_accuracy,{part}"
+    return f"{keys},trained,{other},2,{clusters},{samples},{value},{low},{high}"
+
+
+@pytest.mark.parametrize(
+    ("samples", "clusters", "bounds", "said"),
+    [
+        (120, 9, (0.05, 0.15), "Re-enactment leads Committee"),
+        (120, 9, (-0.15, -0.05), "Committee, the best explainer"),
+        (120, 9, (-0.05, 0.15), "Re-enactment is not shown to lead Committee"),
+        (40, 9, (0.05, 0.15), "Too little to conclude who leads: 13 samples of a kind and 9 families"),
+        (120, 4, (0.05, 0.15), "Too little to conclude who leads: 40 samples of a kind and 4 families"),
+    ],
+)
+def test_who_leads_is_said_first_a_rival_too_and_nothing_is_concluded_from_little(
+    folder, samples, clusters, bounds, said
+):
+    head, *lines = (folder / "cause_intervals.csv").read_text().splitlines()
+    for metric in ("false_alarm_rate", "dominant_accuracy"):
+        lines.append(f"causes,pooled,reenact,{metric},all,,,2,{clusters},{samples},0.5,0.4,0.6")
+    lines.append(difference("reenact", "pair_committee", "all", 240, clusters, sum(bounds) / 2, *bounds))
+    (folder / "cause_intervals.csv").write_text("\n".join([head, *lines, ""]))
+    first = findings_of(folder, TITLES, ("table9_causes",))[0].text
+    assert first.startswith(said), first
+
+
+def test_the_aim_under_shifts_is_said_to_be_missed_where_the_interval_contains_0(folder):
+    rows = [difference("reenact", "pair_committee", part, 240, 9, 0.06, -0.01, 0.13) for part in ("mean", "scaled")]
+    (folder / "shifts.csv").write_text("\n".join([",".join((*KEYS, *AGAINST, *NUMBERS)), *rows, ""]))
+    [finding] = findings_of(folder, TITLES, ("table9_shift",))
+    assert finding.number == "+6 points"
+    assert "The aim is not reached, as the interval contains 0" in finding.text

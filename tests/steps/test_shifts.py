@@ -113,16 +113,19 @@ def test_both_tables_show_all_explainers_and_shifts(folder):
     assert all(f"| {title} |" in by_shift for title in ("As learned", "Scaled", "Planes", "Mean over shifts"))
 
 
+TITLES = {"reenact": "Re-enactment", "residuals": "Residuals"}
+
+
 def test_an_aim_is_reached_by_the_mean_its_interval_and_every_shift():
     def sentence(mean, low, scaled):
         keys = ("causes", "pooled", "reenact", "balanced_accuracy")
         rows = [(*keys, "mean", "trained", "residuals", 1, 2, 9, mean, low, 0.2)]
         rows.append((*keys, "scaled", "trained", "residuals", 1, 2, 9, scaled, -0.1, 0.2))
-        return experiment.reached_by(
-            "reenact", pd.DataFrame(rows, columns=[*KEYS, *AGAINST, *NUMBERS]), {"scaled": "S"}
-        )
+        return experiment.reached(pd.DataFrame(rows, columns=[*KEYS, *AGAINST, *NUMBERS]), {"scaled": "S"}, TITLES)
 
     assert sentence(0.06, 0.01, -0.02).startswith("The aim is reached")
     for missed in ((0.04, 0.01, 0.1), (0.06, -0.01, 0.1), (0.06, 0.01, -0.04)):
         assert sentence(*missed).startswith("The aim is not reached")
-    assert sentence(0.06, 0.01, -0.04).endswith("leads by 6.0 (1.0 to 20.0); below -3 under: S.")
+    assert sentence(0.06, 0.01, -0.04).endswith(" by 6.0 (1.0 to 20.0); below -3 under: S.")
+    assert sentence(0.06, -0.01, 0.1).startswith("The aim is not reached, as the interval contains 0")
+    assert "Residuals leads Re-enactment" in sentence(-0.04, -0.1, 0.1)

@@ -6,6 +6,7 @@ from gpca.comparison.claims import counterparts_of, read_claims
 from gpca.comparison.published import read_published
 from gpca.comparison.values import folders_behind
 from gpca.experiments.diagnosis import cause_titles
+from gpca.experiments.shifts import shifts
 from gpca.declarations.registry import experiments
 from gpca.frames.source import ONE_ENCODER
 
@@ -139,6 +140,7 @@ rule page:
                 for entry in [explainer_entry(name)]
             },
             "cause_explainers": cause_titles(config),
+            "shifts": shifts(config),
             "budget": config["recovery"]["loop"]["budget"],
         },
         sources={name: TITLED[name] for name in (*SOURCES, FRAMES)},
