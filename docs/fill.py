@@ -147,21 +147,23 @@ def passage_of(definition: str | dict, folder: Path) -> str:
 
 
 def sentence(definition: dict, folder: Path) -> str:
-    """Return the first of the `cases` that holds, about the best of some rows."""
-    words, best = shlex.split(definition["of"]), -math.inf
-    for row, title in definition["best"].items():
-        rows, column = _matching([*words, f"explainer={row}"], folder)
-        if rows and (number := float(rows[0][column])) > best:
-            best, texts = number, {"BEST": row, "TITLE": title, "Title": title[0].upper() + title[1:]}
+    """Return the first of the `cases` that holds, perhaps about the best of some rows."""
+    texts, most = dict[str, str](), -math.inf
+    for row, title in definition.get("best", {}).items():
+        rows, column = _matching([*shlex.split(definition["of"]), f"explainer={row}"], folder)
+        if rows and (number := float(rows[0][column])) > most:
+            most, texts = number, {"BEST": row, "TITLE": title, "Title": title[0].upper() + title[1:]}
     for case in definition["cases"]:
         *comparisons, text = [_with(each, texts) for each in (*case.get("if", []), case["text"])]
         if all(holds(comparison, folder) for comparison in comparisons):
             return NUMBER_OF_TEXT.sub(lambda match: value(match[1], folder), text)
-    raise InputError(definition["of"], "no case holds", "end the cases with one without 'if'")
+    raise InputError("cases", "none of them holds", "end them with one without 'if'")
 
 
 def _with(text: str, words: dict[str, str]) -> str:
-    return re.sub("|".join(words), lambda match: words[match[0]], text)
+    for word, put in words.items():
+        text = text.replace(word, put)
+    return text
 
 
 def table(definition: dict, folder: Path) -> str:
