@@ -169,7 +169,7 @@ COLUMNS = (
 )
 NUMBERS = tuple(name for name in COLUMNS[6:] if name != "gate")
 TRUTH = "truth"  # instead of an explainer, in rows of counts, ``count_<kind>``
-FAILED = "failed"  # the same of shares, ``share_<cause>``, of the failed whose start a global method found
+FAILED = "failed"  # in rows of shares, ``share_<cause>``, of the failed whose start a global method found
 EVERY = "all"  # strata
 NATURAL, ADDED = "natural", "noise_added"  # conditions of what is measured; counts are of kinds of start as well
 COUNTED = ("registrations", "pairs", "clusters", *LABELS, BORDERLINE, GEOMETRY, "missed")
