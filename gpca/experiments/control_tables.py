@@ -1,4 +1,4 @@
-"""Table X: accuracy under the controls, from each source to each other, and costs."""
+"""Table X: accuracy under the controls, and from each source to each other."""
 
 from dataclasses import dataclass
 from math import inf
@@ -7,20 +7,19 @@ from typing import Any
 import numpy as np
 
 from gpca.declarations.plan import Run
-from gpca.declarations.result import Figure, Frame, Paths, figure, table
+from gpca.declarations.result import Figure, Frame, figure, table
 from gpca.errors import InputError
 from gpca.evaluation.intervals import REPEATS
-from gpca.evaluation.measures import ALL, POOLED, source_method_seed, tidy
+from gpca.evaluation.measures import ALL, POOLED
 from gpca.experiments.cause_tables import rule_near_chance
 from gpca.experiments.controls import AUROC, CALLS, OF_TRIVIAL, RIVAL, SECTION, USUAL
 from gpca.experiments.explained import titles
 from gpca.explainers.registry import explainer_entry
-from gpca.io.csv_file import read_numbers
 from gpca.reporting.figures import style
 from gpca.reporting.figures.style import SMALL_PT
-from gpca.reporting.sheet import Row, Sheet, Show, crossed, show, with_label
-from gpca.reporting.tables.cells import cell_of_repeats, plain_cell, rows_where
-from gpca.reporting.tables.table import Cell, Column
+from gpca.reporting.sheet import Sheet, Show, crossed, show, with_label
+from gpca.reporting.tables.cells import plain_cell, rows_where
+from gpca.reporting.tables.table import Cell
 from gpca.reporting.words import plural, span
 from gpca.steps import control_samples as samples_of
 from gpca.steps.control_samples import HARD, PAPER, TRANSFER, UNSEEN
@@ -203,58 +202,3 @@ def loophole(run: Run, intervals) -> Figure:
     legend_below(drawing, handles, labels, columns=2, fontsize=SMALL_PT)
     style.write_title(drawing, "All together" if source == POOLED else run.source_titles[source])
     return drawing
-
-
-SECONDS = {"learning_seconds": 1, "seconds": 1e3}  # column of the files -> factor to the table's unit
-
-
-def read_costs(files: Paths) -> Frame:
-    """Seconds to learn, and of one registration, of files ``…/{source}/controls/seed{seed}.csv``."""
-    records = []
-    for path in files:
-        source, _, seed = source_method_seed(path)
-        rows = read_numbers(path, ("explainer", *SECONDS), tuple(SECONDS), least=0)
-        for metric in SECONDS:
-            by_explainer = zip(rows["explainer"], rows[metric], strict=True)
-            records += [("costs", source, name, metric, ALL, seed, float(value)) for name, value in by_explainer]
-    return tidy(records, "costs of the controls")
-
-
-@table(
-    SECTION,
-    "Table X: what seeing the pair costs",
-    """Explainers that see the registrations themselves, through measurements of the pair or an encoder that learns
-    them: seconds to learn, milliseconds per registration, and accuracy.""",
-    needs=("timed_control",),
-    costs=(read_costs, "timings/{source}/controls/seed{control_seed}.csv"),
-    **INTERVALS,
-)
-def table10_costs(run: Run, intervals, costs):
-    pooled = POOLED if len(run.sources) > 1 else next(iter(run.sources))
-    columns = {
-        "learning_seconds": Column("Learning (s)", interval=False, limits=(0, inf)),
-        "seconds": Column("One registration (ms)", interval=False, limits=(0, inf)),
-        **{
-            name: Show(TITLES[name], where={"source": pooled, "metric": "accuracy", "table": name})
-            for name in (PAPER, UNSEEN, TRANSFER)
-        },
-    }
-
-    def seconds(row: Row, _subset: Frame) -> dict[str, Cell | None]:
-        cells = {}
-        for metric, factor in SECONDS.items():
-            seconds_R = rows_where(costs, **row.where, metric=metric).groupby("seed")["value"].mean()
-            cells[metric] = cell_of_repeats((seconds_R * factor).to_numpy(), 0)
-        return cells
-
-    explainers = titles(run.config["controls"]["explainers"])
-    timed = {name: words for name, words in explainers.items() if name in set(costs["method"])}
-    heads = {"explainer": "Explainer"}
-    sheet = Sheet("table10_costs", heads, crossed(("method", timed)), columns, intervals, more=seconds)
-    notes = (
-        "Learning: classifier, and encoder if it has its own, from the measured training samples of a source. One "
-        "registration: to measure, embed and explain it. Times are means over sources and seeds, on one core; "
-        "they differ from run to run.",
-        f"In brackets: {BOOTSTRAP}.",
-    )
-    return sheet.table("What explainers of the pair cost and gain" + run.stand_ins(), "metric", notes, keep_empty=True)

@@ -16,7 +16,7 @@ from gpca.errors import InputError, with_key
 from gpca.evaluation.intervals import TRIVIAL, Clustered, best_of, interval, weighted_mean
 from gpca.evaluation.measures import ALL, POOLED, TEST_SAMPLES, intervals, source_method_seed, tidy
 from gpca.experiments.explained import explainer_settings, require_explained
-from gpca.explainers.interface import BARE, REENACTED
+from gpca.explainers.interface import REENACTED
 from gpca.explainers.registry import explainer_entry, explainer_module
 from gpca.io.csv_file import numbers as number_column
 from gpca.settings import changes_of
@@ -53,7 +53,6 @@ def names(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str
         "control_seed": list(config["seeds"])[: controls["seeds"]],
         "control": list(RETRAINED),
         "control_embedding": config["embedding"]["encoder"],
-        "timed_control": [name for name in controls["explainers"] if explainer_entry(name).reads == BARE],
         "transfer_source": list(sources) if TRANSFER in controls["controls"] and len(sources) > 1 else [],
     }
 
@@ -159,10 +158,7 @@ EXPLAIN = Step(
             f"control_embeddings/{name}/{{source}}/seed{{seed}}.npz" for name in _controls_of(plan, wildcards)[1]
         ],
     },
-    outputs={
-        "predictions": "controls/{source}/seed{seed}.csv",
-        "timings": "timings/{source}/controls/seed{seed}.csv",
-    },
+    outputs={"predictions": "controls/{source}/seed{seed}.csv"},
     settings=lambda plan, wildcards: (
         _settings(plan, wildcards)
         | {

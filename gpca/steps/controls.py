@@ -1,14 +1,11 @@
 """Step ``explain_controls``: registrations and embeddings -> predictions of every explainer under every control."""
 
 import sys
-from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import reduce
 from itertools import zip_longest
 from pathlib import Path
-from time import perf_counter
 
 import numpy as np
 import pandas as pd
@@ -18,7 +15,7 @@ from gpca.attribution.predictions import prediction_frame
 from gpca.causes.training import joined_without
 from gpca.classifier.scores import Attribution
 from gpca.encoders.registry import EncoderSettings
-from gpca.explainers.interface import BARE, EMBEDDINGS, REENACTED, Describing, Encoding, ExplainerEntry, answer_of
+from gpca.explainers.interface import EMBEDDINGS, REENACTED, Encoding, ExplainerEntry, answer_of
 from gpca.explainers.registry import Embed, described_for, make_rivals
 from gpca.io.csv_file import write_csv
 from gpca.jobs.job import Job
@@ -33,8 +30,6 @@ from gpca.uncertainty.designs import evaluate_design
 from gpca.uncertainty.settings import UncertaintySettings
 
 PARTS, FEWEST_OF_PART = 5, 60  # of the training samples whose labels are shuffled
-ASKED = 12  # registrations that are described once more, for the time that it takes
-COSTS = ("explainer", "learning_seconds", "seconds")
 Attach = Callable[[Registrations], Registrations]
 
 
@@ -51,7 +46,7 @@ def explain(job: Job) -> None:
     axes = (job.source, job.seed)
     inputs = [job.registrations, job.encoder, job.embeddings]
     inputs += [*retrained.values(), *others.values(), *job.get("all_hard", []), *job.get("all_hard_reenactments", [])]
-    with record_provenance([job.predictions, job.timings], inputs, job.settings, seed=job.seed):
+    with record_provenance([job.predictions], inputs, job.settings, seed=job.seed):
         registrations = Registrations.load(job.registrations, axes)
         all_hard = read_hard(job.get("all_hard", []), job.get("all_hard_reenactments", []), job.seed)
         embeddings = {PAPER: read_embedding(job.embeddings, registrations, logits=True)}
@@ -77,7 +72,6 @@ def explain(job: Job) -> None:
             registrations, {name: Registrations.load(path, (name, job.seed)) for name, path in others.items()}
         )
         write_csv(job.predictions, rows)
-        write_csv(job.timings, experiment.costs.rows())
 
 
 def read_hard(paths: Sequence[Path], reenactments: Sequence[Path], seed: int) -> dict[str, Registrations]:
@@ -86,34 +80,6 @@ def read_hard(paths: Sequence[Path], reenactments: Sequence[Path], seed: int) ->
         path.parent.name: with_what_it_reads(Registrations.load(path, (path.parent.name, seed)), REENACTED, enacted)
         for path, enacted in zip_longest(paths, reenactments)
     }
-
-
-@dataclass
-class Costs:
-    """Seconds of the explainers under the paper's protocol.
-
-    Attributes:
-        learning: of each, with its encoder if it has its own.
-        asking: to measure and embed one registration.
-        explaining: of one registration, with all measurements made.
-    """
-
-    learning: dict[str, float] = field(default_factory=lambda: defaultdict(float))
-    asking: dict[str, float] = field(default_factory=dict)
-    explaining: dict[str, float] = field(default_factory=dict)
-
-    @contextmanager
-    def count_learning(self, control: str, explainer: str) -> Iterator[None]:
-        """Count the seconds of the body, under the paper's protocol."""
-        started = perf_counter()
-        yield
-        if control == PAPER:
-            self.learning[explainer] += perf_counter() - started
-
-    def rows(self) -> pd.DataFrame:
-        """`COSTS` of each explainer that reads bare registrations."""
-        records = [(name, self.learning[name], asking + self.explaining[name]) for name, asking in self.asking.items()]
-        return pd.DataFrame(records, columns=list(COSTS))
 
 
 @dataclass(frozen=True)
@@ -139,7 +105,6 @@ class ControlRun:
     embeddings: Mapping[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
     hard: Registrations | None = None
     other_hard: Sequence[Registrations] = ()
-    costs: Costs = field(default_factory=Costs)
 
     def run(self, registrations: Registrations, others: Mapping[str, Registrations]) -> pd.DataFrame:
         """Rows of a prediction file after `LABELS`, by control, explainer and test sample; ``tested`` is its source.
@@ -170,13 +135,6 @@ class ControlRun:
                 test = self._embedded(other.subset(other.rows("test")), name)
                 tests[TRANSFER, name] = _attached(embeds, self._described(test, name))
         frames = list(self._explained(PAPER, plain, tests, self.rivals))
-        test = plain.subset(plain.rows("test")[:ASKED])
-        for name, rival in self.rivals.items():  # times what explainers of bare registrations measure before they can
-            if rival.reads == BARE:
-                bare, explainer, started = replace(test, attached={}), rival.made(), perf_counter()
-                described = explainer.describe(bare) if isinstance(explainer, Describing) else bare
-                _attached({name: embeds[name]} if name in embeds else {}, described)
-                self.costs.asking[name] = (perf_counter() - started) / len(test)
         for control in admitted:
             if control != TRANSFER:
                 changed = self._changed(control, plain, embeds)
@@ -228,8 +186,7 @@ class ControlRun:
         for name, rival in self.rivals.items():
             explainer = rival.made()
             if isinstance(explainer, Encoding):
-                with self.costs.count_learning(control, name):
-                    embeds[name] = explainer.learn_encoder(train)
+                embeds[name] = explainer.learn_encoder(train)
         return embeds
 
     def _tests(self, control: str, changed: Registrations) -> dict[tuple[str, str], Registrations]:
@@ -272,12 +229,9 @@ class ControlRun:
                     continue
                 if control != HARD and rival.reads == REENACTED:
                     continue
-                with self.costs.count_learning(control, name):
-                    explainer.fit(_learned_from(rival, train))
+                explainer.fit(_learned_from(rival, train))
                 for (name_of_test, source), test in asked.items():
                     attribution = answer_of(explainer, test.without_labels())
-                    if name_of_test == PAPER:
-                        self.costs.explaining[name] = float(attribution.seconds_N.mean())
                     frame = prediction_frame(test, attribution)
                     for i, entry in enumerate(zip(LABELS, (name_of_test, source, name), strict=True)):
                         frame.insert(i, *entry)

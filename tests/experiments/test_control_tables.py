@@ -1,4 +1,4 @@
-"""Table X: under the controls, from each source to each other, with other encoders, and costs."""
+"""Table X: under the controls, and from each source to each other."""
 
 from types import SimpleNamespace
 
@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 from gpca.declarations.plan import Run
-from gpca.evaluation.measures import AGAINST, KEYS, NUMBERS, POOLED, TIDY_COLUMNS
-from gpca.experiments.control_tables import table10_controls, table10_costs, table10_transfer
+from gpca.evaluation.measures import AGAINST, KEYS, NUMBERS, POOLED
+from gpca.experiments.control_tables import table10_controls, table10_transfer
 
 TITLES = {"good": "Good", "head": "Head", "gpca": "GP-CA", "gpca_pair": "GP-CA on the pair"}
 SEES = {"good": "pair", "head": "aligned source"}
@@ -29,7 +29,6 @@ def run(*controls, explainers=("good", "head"), stand_in=True):
 
 
 SOURCES = ("ycb", "cups")
-ENCODERS = run(explainers=("gpca", "gpca_pair"), stand_in=False)
 LEAD, GAIN = ("rival", "head", 0.08, 0.05, 0.1), ("trivial", "rule", -0.02, -0.04, 0.01)
 
 
@@ -117,30 +116,3 @@ def test_a_transfer_has_the_source_learnt_from_in_its_row(intervals):
     assert "| Good | YCB (procedural stand-in) | 98.0 (94.0 to 100.0) | 60.0 (56.0 to 62.0) | – |" in text
     assert "| Good | Cups (procedural stand-in) | 50.0 (46.0 to 52.0) | 98.0 (94.0 to 100.0) | – |" in text
     assert "| Good | another (mean) | 78.0 (74.0 to 80.0) | 78.0 (74.0 to 80.0) | 78.0 (74.0 to 80.0) |" in text
-
-
-def encoder_row(control, source, trained_on, method, value, change, seeds=3):
-    keys = (control, source, method, "accuracy", trained_on if control == "transfer" else "all")
-    entries = [("", "", value, value - 0.03, value + 0.01), ("usual", "gpca", change, change - 0.02, change + 0.02)]
-    return [(*keys, *entry[:2], seeds, 5, 200 * seeds, *entry[2:]) for entry in entries]
-
-
-@pytest.fixture
-def encoded():
-    rows = []
-    for source in (*SOURCES, POOLED):
-        for control, value in (("paper", 0.98), ("unseen_objects", 0.75)):
-            rows += encoder_row(control, source, source, "gpca_pair", 0.99, 0.0)
-            rows += encoder_row(control, source, source, "gpca", value, 0.0)
-        rows += encoder_row("transfer", source, POOLED, "gpca_pair", 0.97, -0.02)
-    return pd.DataFrame(rows, columns=COLUMNS)
-
-
-def test_a_cost_stands_beside_its_gain(encoded):
-    seconds = {("ycb", "learning_seconds"): 2.0, ("cups", "learning_seconds"): 4.0, ("ycb", "seconds"): 0.008}
-    records = [("costs", source, "gpca_pair", metric, "all", 100, value) for (source, metric), value in seconds.items()]
-    table = table10_costs(ENCODERS, encoded, pd.DataFrame(records, columns=list(TIDY_COLUMNS)))
-    assert (
-        "| GP-CA on the pair | 3.0 | 8.0 | 99.0 (96.0 to 100.0) | 99.0 (96.0 to 100.0) | 97.0 (94.0 to 98.0) |"
-        in table.markdown()
-    )

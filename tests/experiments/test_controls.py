@@ -6,7 +6,6 @@ import pytest
 
 from gpca.declarations.plan import Run
 from gpca.evaluation.measures import POOLED, read_clustered, write_metrics
-from gpca.experiments.control_tables import read_costs
 from gpca.experiments.controls import collect, collect_intervals, read_controls
 from gpca.io.csv_file import write_csv
 from gpca.pairs.perturbation import CONCEPTS
@@ -106,13 +105,3 @@ def test_a_control_of_some_seeds_is_compared_with_the_same_seeds_of_the_papers_p
     density = rows_of(files, tmp_path / "control_intervals.csv").loc["density", "a", "all", "gpca", "accuracy"]
     assert density.loc["", "seeds"] == 1
     assert density["value"][["", "usual"]].tolist() == pytest.approx([0.7, -0.2])
-
-
-def test_seconds_are_tidy_by_source_and_explainer(tmp_path):
-    path = tmp_path / "timings" / "a" / "controls" / "seed100.csv"
-    write_csv(path, pd.DataFrame({"explainer": ["gpca_pair"], "learning_seconds": [2.5], "seconds": [0.01]}))
-    rows = read_costs([path]).set_index(["source", "method", "metric", "seed"])["value"]
-    assert rows.to_dict() == {
-        ("a", "gpca_pair", "learning_seconds", 100): 2.5,
-        ("a", "gpca_pair", "seconds", 100): 0.01,
-    }

@@ -9,7 +9,6 @@ from baselines.pair import PairGPCA
 from baselines.residuals import residuals_logistic
 from gpca.encoders.registry import EncoderSettings
 from gpca.steps.control_samples import ControlSettings, encode, of_unseen_objects
-from gpca.steps.controls import ASKED
 
 from .six_objects import Head, Nearest, attached, experiment, rival, seen
 
@@ -127,7 +126,7 @@ def test_what_is_measured_of_a_registration_is_measured_once_for_all_controls(si
         "residuals": rival(partial(residuals_logistic, "tiny", 100), "uncertainty/removal"),
     }
     found = experiment(six, "label_noise_30", "shuffled", rivals=rivals).run(six, {})
-    assert measured == [len(six), ASKED]  # a few again, to take the time
+    assert measured == [len(six)]
     assert found.groupby(["control", "explainer"]).size().tolist() == [18] * 6
     alone = experiment(replace(six, attached={}), "shuffled", rivals={"residuals": rivals["residuals"]}).run(six, {})
     both = found[(found["explainer"] == "residuals") & (found["control"] != "label_noise_30")]
@@ -157,8 +156,6 @@ def test_an_encoder_of_an_explainer_is_trained_once_for_all_labels_and_anew_for_
     assert of_paper == of_density == six.concept[six.split == "train"].tolist()
     assert of_known == of_unseen.concept[of_unseen.split == "train"].tolist()
     assert all(share_right(found, control=control) == 1 for control in ("density", "unseen_objects", "transfer"))
-    [cost] = made.costs.rows().to_dict("records")
-    assert cost["explainer"] == "own" and cost["learning_seconds"] > 0 and cost["seconds"] >= 0
 
 
 @pytest.mark.parametrize(
