@@ -50,6 +50,14 @@ def test_no_natural_registration_fails_by_noise():
     )  # of the points that are drawn
 
 
+def test_a_crop_of_one_scan_alone_names_a_cause_where_a_global_method_started():
+    pair = corner_pair(0.3)
+    kinds = (module.GLOBAL, module.LADDER)
+    starts = [module.ScanStart(0, kind, kind, start_off(pair, 0, 0.0)) for kind in kinds]
+    _, table = measured(pair, *starts)
+    assert table["dominant_one_sided"].tolist() == ["overlap", ""]
+
+
 def test_nothing_is_wrong_with_what_both_see_started_at_the_truth():
     pair = corner_pair(1.0)
     start = module.ScanStart(0, module.LADDER, "rung", pair.T_target_source)

@@ -113,6 +113,8 @@ def test_pairs_are_drawn_stratum_by_stratum_whatever_other_scenes_there_are():
     assert strata == sorted(strata) and len(chosen) == 6
     wide = [pair.name for pair in choose_pairs([scene()], (0.0, 1.0), 2, "tiny", 0)]
     assert len(wide) == 2 and wide == sorted(wide)
+    pairs = len(choose_pairs([scene()], (0.0, 1.0), 99, "tiny", 0))  # of which the two stand for all
+    assert sum(p.stands_for for p in choose_pairs([scene()], (0.0, 1.0), 2, "tiny", 0)) == pytest.approx(pairs)
     draws = {tuple(p.name for p in choose_pairs([scene()], (0.0, 1.0), 2, "tiny", seed)) for seed in range(8)}
     assert len(draws) > 1
 
