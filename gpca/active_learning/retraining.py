@@ -82,8 +82,8 @@ def learn(
 ) -> Learned:
     """Spend labels with one strategy until all target accuracies are reached, and at least `settings.least`.
 
-    In a round that first reaches a target, labels are also added one by one, to count them exactly: the curve has a
-    step at each target. With a single one, its ``epochs`` are the passes up to the target, not of the whole retraining.
+    In a round that first reaches a target, labels are also added one by one: the curve has a step at each target. With
+    a single one, its ``epochs`` are the passes up to the target.
     """
     task = retraining.task
     random = generator(*axes, "retraining", task.held_out, strategy)

@@ -136,7 +136,7 @@ def run_stream(
     asks at random.
 
     A row per `every` arrivals has ``arrived``; ``present``, whether the quiet time is over; ``running`` accuracy over
-    the last `window` arrivals, each judged before its label; and a step of :func:`gpca.active_learning.rounds.rounds`.
+    the last `window` arrivals, each judged before its label; and a step of rounds.
     """
     from skactiveml.stream import StreamRandomSampling
     from skactiveml.stream.budgetmanager import BalancedIncrementalQuantileFilter

@@ -1,15 +1,11 @@
 """DGCNN (Wang et al. 2019), the encoder of GP-CA; its EdgeConv is evaluated per point instead of per edge.
 
-The edge function is one linear layer W on ``[x_j - x_i ; x_i]``. With ``W = [W1 | W2]`` it splits into
-
-    y_ij = W1 x_j + (W2 - W1) x_i = A_j + C_i ,
-
-so the matrix product runs over N points, not N·k edges. Batch normalization is affine and LeakyReLU monotone, hence
+The linear layer W = [W1 | W2] on ``[x_j - x_i ; x_i]`` splits into y_ij = W1 x_j + (W2 - W1) x_i = A_j + C_i, so the
+product runs over N points, not N·k edges. Batch normalization is affine and LeakyReLU monotone, hence
 
     max_j act(γ (y_ij - μ)/σ + β) = act(γ (ext_j y_ij - μ)/σ + β),  ext = max where γ >= 0, min where γ < 0.
 
-In training, μ and σ² are taken over all B·N·k edges, as in a per-edge layer (:mod:`gpca.encoders.edge_kernels`).
-Outputs, running statistics and gradients agree with the per-edge form in ``tests/encoders/per_edge.py``.
+μ and σ² are those of all B·N·k edges. ``tests/encoders/per_edge.py`` is the per-edge form.
 """
 
 from collections.abc import Sequence
@@ -68,10 +64,7 @@ class DGCNN(nn.Module):
 
 
 class PairDGCNN(nn.Module):
-    """DGCNN on the points of both clouds of a registered pair (:func:`gpca.pairs.distances.describe_points`).
-
-    Each point has its membership (±1) as one more channel; the `motion` numbers of ICP's motion follow the embedding.
-    """
+    """DGCNN on the points of both clouds of a registered pair; the `motion` numbers of ICP's motion follow."""
 
     def __init__(
         self, k: int = 10, widths: tuple[int, ...] = (32, 32, 64), point_features: int = 64, motion: int = MOTION

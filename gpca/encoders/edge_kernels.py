@@ -1,9 +1,8 @@
 """Compiled passes over neighbors behind :class:`gpca.encoders.dgcnn.EdgeConv`.
 
-All arrays are C-contiguous float32 (float64 in gradient checks). ``ac`` (B, N, 2F) holds A in its first F and C in its
-last F channels. Clouds run in parallel; sums are made within one cloud and clouds are added in order, so the number of
-threads changes no bit. Inner loops run over channels, where they vectorize. A pass fills the arrays that the function
-of its name makes.
+Arrays are C-contiguous; ``ac`` (B, N, 2F) holds A in its first F and C in its last F channels. Clouds run in parallel,
+are summed one by one and added in order, so that the number of threads changes no bit. A pass fills the arrays that the
+function of its name makes.
 """
 
 from __future__ import annotations
@@ -16,8 +15,7 @@ from gpca.process.compilation import OVER_CLOUDS, njit, prange
 def smallest_k(distances: np.ndarray, k: int) -> np.ndarray:
     """Return for every row of ``distances`` (B, N, M) the columns of its k smallest entries, ties to the lower column.
 
-    Searches for a value that exactly k entries do not exceed: counting vectorizes, which is about ten times faster than
-    keeping the k best while scanning. Rows are independent, so one cloud occupies several threads.
+    Counting the entries up to a value vectorizes, which is ten times faster than keeping the k best.
     """
     batch, n, columns = distances.shape
     # Not np.empty: a row with NaN fills too few slots, but the rest must still be indices of points.
@@ -41,8 +39,7 @@ def _smallest_k(rows, k, chosen):
 def _bracket(row, k):
     """Return (below, above, count): fewer than k entries are <= below, count >= k are <= above.
 
-    Starts at the range of the first k entries and widens it downward. Squared distances to points on a surface are
-    about evenly spread, so interpolating the counts usually beats bisection; when it does not, bisection is next.
+    Interpolates the counts, as distances are about evenly spread, or bisects where that gains less than half.
     """
     half = row.dtype.type(0.5)
     above = below = row[0]
@@ -182,10 +179,7 @@ def _normalize_activate(extreme, mean, inverse_std, gamma, beta, slope, out):
 
 
 def gather_max_affine(ac: np.ndarray, *others: np.ndarray | float) -> np.ndarray:
-    """Return max_j act(scale · (A_j + C_i) + shift), (B, N, F), in one pass without statistics, for inference.
-
-    The others are the neighbors, scale, shift and slope.
-    """
+    """Return max_j act(scale · (A_j + C_i) + shift), (B, N, F), by the neighbors, scale, shift and slope."""
     out = np.empty((*ac.shape[:2], ac.shape[2] // 2), ac.dtype)
     _gather_max_affine(ac, *others, out)
     return out
@@ -216,8 +210,6 @@ def _gather_max_affine(ac, neighbors, scale, shift, slope, out):
 
 def edge_max_backward(grad_out: np.ndarray, ac: np.ndarray, *others: np.ndarray | float) -> tuple[np.ndarray, ...]:
     """Return grad_ac (B, N, 2F), grad_gamma (F,), grad_beta (F,) of :func:`normalize_activate`.
-
-    The others are what the pass below names, from the neighbors to the slope.
 
     With g the gradient at the extreme edges and ŷ the normalized edges, batch norm over E edges gives
 

@@ -2,8 +2,7 @@
 
 Edges e are the distinct pairs of a group and one of its points, ordered by cloud and group: cloud b has the rows
 ``cloud_ends[b]`` to ``cloud_ends[b + 1]``, group g the rows ``ends[g]`` to ``ends[g + 1]``. All arrays are C-contiguous
-float32. Clouds run in parallel; sums are made within one cloud and clouds are added in order, so the number of threads
-changes no bit. Inner loops run over points or channels, where they vectorize.
+float32. Clouds run in parallel, are summed one by one and added in order, so that the number of threads changes no bit.
 """
 
 from __future__ import annotations

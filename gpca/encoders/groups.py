@@ -1,16 +1,13 @@
 """PointNets on the points of groups (Qi et al. 2017, 2017b), evaluated once per distinct point instead of per slot.
 
-A group has k slots. Each slot holds a point j and is mapped by shared layers of linear map, batch norm and ReLU; the
-maximum over the slots is the group's feature. Two equalities save most of the work:
+Each of a group's k slots holds a point j and is mapped by shared layers; the maximum over the slots is the group's
+feature. Two equalities save most of the work:
 
-- The first linear map W = [Wx | Wf] acts on ``[(p_j - c_g)/r ; f_j]``, so it splits into A_j + C_g with
-  A_j = Wx p_j/r + Wf f_j and C_g = -Wx c_g/r: a matrix product over the points, not over the slots of all groups.
-- A ball with fewer than k points repeats its first one. Repeats do not change the maximum, and batch norm counts them
-  by a weight, so only distinct points are evaluated: with 512 points this saves a quarter of PointNeXt's slots and two
-  fifths of PointNet++'s.
+- The first linear map W = [Wx | Wf] of ``[(p_j - c_g)/r ; f_j]`` splits into A_j + C_g with A_j = Wx p_j/r + Wf f_j and
+  C_g = -Wx c_g/r: a matrix product over the points, not over the slots of all groups.
+- A ball with fewer than k points repeats its first one, which batch norm counts by a weight.
 
-Means and variances are taken over all B·M·k slots. Outputs, running statistics and gradients agree with
-``GroupMLP.plain``, which also serves CUDA.
+``GroupMLP.plain`` is the same without these, for CUDA.
 """
 
 from __future__ import annotations
@@ -45,10 +42,7 @@ class Groups:
 
 
 class GroupMLP(nn.Module):
-    """Layers of linear map, batch norm and ReLU on the slots of each group, then their maximum.
-
-    Without `last_relu`, a residual can be added before the last ReLU.
-    """
+    """Layers of linear map, batch norm and ReLU on the slots of each group, the last perhaps without; their maximum."""
 
     def __init__(self, in_features: int, widths: tuple[int, ...], last_relu: bool = True) -> None:
         super().__init__()

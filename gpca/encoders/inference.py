@@ -80,12 +80,9 @@ class TrainedEncoder:
 def embed_clouds(
     weights: Mapping[str, np.ndarray], k: int, x_B_N_F: np.ndarray, sizes: Sequence[int] | None = None
 ) -> np.ndarray:
-    """Return DGCNN's embeddings (B, d) of clouds, with the bits of torch's layers.
+    """Return DGCNN's embeddings (B, d) of clouds by its state, with the bits of torch's layers.
 
-    Args:
-        weights: the state of :class:`gpca.encoders.dgcnn.DGCNN`.
-        k: neighbors of a point, itself included.
-        x_B_N_F: (B, N, F) float32. With `sizes`, it holds clouds of these sizes one after another, and B is 1.
+    With `sizes`, `x_B_N_F` holds clouds of these sizes one after another, and B is 1.
     """
     features = []
     for layer in range(sum(name.startswith("edge_convs.") and name.endswith(".norm.weight") for name in weights)):
@@ -175,10 +172,7 @@ def _squares(x_P_F: np.ndarray) -> np.ndarray:
 
 
 def _mean(x_B_N_F: np.ndarray) -> np.ndarray:
-    """Return the mean over the points (B, F), added in torch's order.
-
-    Of the channels beyond a multiple of `CHANNELS`, every fourth point is added first.
-    """
+    """Return the mean over the points (B, F), added in torch's order: narrow channels every fourth point first."""
     rows, wide = np.moveaxis(x_B_N_F, 1, 0), x_B_N_F.shape[2] // CHANNELS * CHANNELS
     narrow, fourth = rows[..., wide:], len(rows) // 4 * 4
     first, *others = (_added(narrow[i:fourth:4]) for i in range(4))

@@ -1,8 +1,4 @@
-"""Layers on many points: linear maps by NumPy's product on the CPU, and batch norm with given statistics.
-
-NumPy's OpenBLAS with pinned instructions (:mod:`gpca.process.processor`) gives the same bytes on every machine at the
-speed of torch's MKL, whose vendor-independent code takes twice the time.
-"""
+"""Layers on many points: linear maps by NumPy's product, with the same bytes on every CPU, and given statistics."""
 
 from typing import Any
 

@@ -28,12 +28,9 @@ class PointNet(nn.Module):
 class PointNet2(nn.Module):
     """PointNet++ with single-scale grouping (Qi et al. 2017b): set abstraction at 256 and 64 centroids, then the whole.
 
-    The published network has 512 and 128 centroids for clouds of 1024 points; here at most half of the points are
-    centroids of the first level. Its radii of 0.2 and 0.4 are for clouds of diameter 2, so here 0.1 and 0.2.
-
-    Two inputs differ from the published ones. Absolute coordinates are features too (as normals are in the published
-    network): relative coordinates alone hide where a ball lies until the last level. And relative coordinates are
-    divided by the radius: ten times smaller than the absolute ones, they would be learned late.
+    The published radii of 0.2 and 0.4 are for clouds of diameter 2, so here 0.1 and 0.2, and at most half of the points
+    are centroids. Absolute coordinates are features too, and relative ones are divided by the radius, as they would be
+    learned late.
     """
 
     def __init__(self, width: int = 64, centroids: int = 256, radius: float = 0.1, neighbours: int = 32) -> None:
@@ -76,7 +73,7 @@ class PointNeXt(nn.Module):
     """PointNeXt-S for classification (Qian et al. 2022): a stem, four stages of set abstraction, the whole cloud.
 
     Each stage halves the points and doubles the channels. The first radius of 0.15 is for clouds of diameter 2, so here
-    0.075 diameters, growing by 1.5 with each stage. As published, absolute coordinates enter the stem.
+    0.075 diameters, growing by 1.5 with each stage.
     """
 
     def __init__(self, width: int = 32, radius: float = 0.075, neighbours: int = 32) -> None:

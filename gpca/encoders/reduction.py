@@ -1,8 +1,4 @@
-"""Dimensionality reductions of embeddings by name (paper, Table VI): none, PCA, UMAP, autoencoder.
-
-Each is fitted on the standardized training embeddings and is then a fixed function of one embedding: other rows do not
-matter. A new one is a class here and a line in `REDUCTIONS`.
-"""
+"""Reductions of embeddings by name (paper, Table VI), fitted on the standardized training embeddings."""
 
 import warnings
 from collections.abc import Callable, Iterator
@@ -57,10 +53,7 @@ class UMAP:
 
 @dataclass(frozen=True)
 class Autoencoder:
-    """Autoencoder (Hinton & Salakhutdinov 2006) d - 256 - components - 256 - d with GELU and a linear code.
-
-    Adam (learning rate 1e-3, batches of 32) minimizes the mean squared error of the standardized embeddings.
-    """
+    """Autoencoder (Hinton & Salakhutdinov 2006) d - 256 - components - 256 - d with GELU and a linear code."""
 
     components: Count = 64
     epochs: Count = 100
@@ -99,10 +92,7 @@ REDUCTIONS = {"none": None, "pca": PCA, "umap": UMAP, "autoencoder": Autoencoder
 
 
 def reduce(name: str, h_train_N_d: np.ndarray, h_S_d: np.ndarray, settings: dict, *axes: object) -> np.ndarray:
-    """Fit a reduction on training embeddings and apply it: (S, components), float32; ``none`` returns (S, d) unchanged.
-
-    The axes name the random numbers. An InputError rejects what cannot be reduced.
-    """
+    """Fit a reduction on training embeddings and apply it: (S, components), float32; ``none`` changes nothing."""
     reduction = make_reduction(name, settings)
     for h, role in ((h_train_N_d, "training embeddings"), (h_S_d, "embeddings")):
         if not np.isfinite(h).all():

@@ -1,7 +1,6 @@
 """Training an encoder with a head over the concepts (paper Sec. III-A), its files, and the embeddings.
 
-Each epoch draws new points from every cloud. There is no other augmentation: rotations and shifts would erase the pose
-concept, jitter the noise concept, crops the overlap concept.
+Each epoch draws new points from every cloud. Any other augmentation would erase a concept.
 """
 
 import hashlib
@@ -37,8 +36,7 @@ def draw_points(
 ) -> torch.Tensor | list[torch.Tensor]:
     """Draw `n_points` random points of each row's aligned cloud, (B, N, 3) float32; small clouds repeat points.
 
-    With `fewest`, the result is B clouds (N, 3) with a random number of points from `fewest` to `n_points`, or all
-    points of a smaller cloud.
+    With `fewest`, return B clouds of a random number of points from `fewest` to `n_points`, or all of a smaller one.
     """
     clouds = []
     for row in rows:
@@ -105,15 +103,10 @@ def train_encoder(
     """Train on the rows of split ``train``; a share of their groups can be held out for validation.
 
     With validation, the weights are those of the epoch with the smallest validation loss, and training may end early.
+    Training resumes from a checkpoint of the same settings and data, from random weights or those of `start`. Rows of
+    one group (S,), by default of one object, are held out together. `make` gives an encoder beside the registry's.
 
-    Args:
-        checkpoint: file of the state after every epoch; if it belongs to the same settings and data, training resumes
-            from it and ends with the same weights as an unbroken run.
-        start: initial weights; random by default.
-        group_S: (S,) rows of one group are held out together. By default, consecutive rows of one object.
-        make: makes an encoder that is not in the registry.
-
-    Returns the model, and for each epoch: epoch, learning_rate, loss, accuracy, and those of the validation.
+    Return the model, and for each epoch: epoch, learning_rate, loss, accuracy, and those of the validation.
     """
     torch.manual_seed(seed_of(source, seed, "encoder", settings.backbone))
     model = make_model(settings, classes, make and make()).to(best_device())
@@ -291,11 +284,7 @@ def embed(
     settings: EncoderSettings,
     draw: Draw = draw_points,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return embeddings h (S, d) of all rows and the head's logits (S, C) at them; float32.
-
-    h is the mean over ``draws`` draws of N points. One uses a quarter of a cloud of 2048 points; averaging several
-    halves the classifier's errors on unseen clouds.
-    """
+    """Return embeddings h (S, d) of all rows, the mean over draws of N points, and the head's logits (S, C)."""
     model.to(best_device()).eval()
     batches = np.array_split(np.arange(len(registrations)), -(-len(registrations) // settings.batch_size))
     parts = []

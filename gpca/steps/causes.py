@@ -46,10 +46,7 @@ def describe(job: Job) -> None:
 
 
 def reenact(job: Job) -> None:
-    """Re-enact every pair under hypotheses of its true pose -> ``reenactments/{source}/seed{seed}.npz``.
-
-    Of the truth's settings it reads how ICP runs, and the limits of the states.
-    """
+    """Re-enact every pair under hypotheses of its true pose -> ``reenactments/{source}/seed{seed}.npz``."""
     from gpca.reenactment.dataset import reenact_all
 
     settings = read_settings(ReenactmentSettings, job.section("reenactment"))
@@ -83,10 +80,7 @@ def oracles(job: Job) -> None:
 
 
 def train_on_causes(job: Job) -> None:
-    """Train an encoder to tell the labels of causes apart -> its weights and curve, and the embeddings of all samples.
-
-    It learns from the training samples that have a label, and keeps a checkpoint.
-    """
+    """Train an encoder on the training samples with a label of causes -> weights, curve, embeddings of all samples."""
     import pandas as pd
 
     from gpca.encoders.training import embed, train_encoder, write_weights

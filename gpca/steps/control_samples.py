@@ -1,7 +1,4 @@
-"""Samples of the controls: registrations as each control changes them, and encoders trained on them.
-
-Step ``train_control``: registrations -> embeddings by an encoder that is trained under a control.
-"""
+"""Samples of the controls: registrations as each control changes them; encoders trained on them (``train_control``)."""
 
 import sys
 from dataclasses import dataclass, replace
@@ -43,20 +40,13 @@ Points = Annotated[int, Bounds(minimum=32, maximum=65536)]
 
 @dataclass(frozen=True)
 class ControlSettings:
-    """The controls, and their sizes.
-
-    Attributes:
-        encoder_seeds: how many of `seeds`, from the first, train more encoders than those of `OF_EVERY_SEED`.
-        seeds: how many of the run's seeds are used, from the first.
-        draw_points: range of the random number of points of a cloud where density is matched.
-        folds: of a source's objects, of which one is unseen.
-    """
+    """The controls, and their sizes."""
 
     controls: Distinct[Control] = ("density", "unseen_objects", "label_noise_30", "shuffled", "transfer")
-    encoder_seeds: Count = 1
-    seeds: Count = 3
-    draw_points: tuple[Points, Points] = (200, 512)
-    folds: Annotated[int, Bounds(minimum=2, maximum=5)] = 3
+    encoder_seeds: Count = 1  # the first so many of `seeds` train more encoders than those of `OF_EVERY_SEED`
+    seeds: Count = 3  # the first so many of the run's
+    draw_points: tuple[Points, Points] = (200, 512)  # range of a cloud's random number of points for matched density
+    folds: Annotated[int, Bounds(minimum=2, maximum=5)] = 3  # of a source's objects, of which one is unseen
 
     def __post_init__(self) -> None:
         if self.draw_points[0] > self.draw_points[1]:
@@ -95,10 +85,7 @@ def variant(
 
 
 def thinned(registrations: Registrations, points: tuple[int, int], *axes: object) -> Registrations:
-    """Registrations with a random number of points of each source cloud, whatever its concept.
-
-    A fixed number makes a cropped cloud denser than the others, and all points make it the smallest.
-    """
+    """Return registrations with a random number of points of each source cloud, whatever its concept."""
     clouds, targets = [], []
     for row in range(len(registrations)):
         cloud = registrations.cloud(row)
@@ -111,10 +98,9 @@ def thinned(registrations: Registrations, points: tuple[int, int], *axes: object
 
 
 def of_unseen_objects(registrations: Registrations, folds: int, source: str, seed: int) -> Registrations:
-    """Training samples of most objects; test samples are all of the other objects.
+    """Return training samples of most objects, and all samples of the other objects as test samples.
 
-    The families of a source's objects are in folds that a file names, or are dealt into `folds` once for all seeds. A
-    seed leaves out the fold of its number, so that as many seeds as folds test every object once.
+    Families are in folds that a file names, or are dealt into `folds`; a seed leaves out the fold of its number.
     """
     is_unseen = unseen(registrations.fold, seed)
     if is_unseen is None:
@@ -130,11 +116,9 @@ def of_unseen_objects(registrations: Registrations, folds: int, source: str, see
 
 
 def relabeled(control: str, train: Registrations, *axes: object) -> Registrations:
-    """Training samples with the labels of a control.
+    """Return training samples with the labels of a control: a share names another concept, or all are shuffled.
 
-    With label noise, that share of the labels names one of the other concepts. Where labels are shuffled, each
-    concept's samples get every label equally often, so that only chance can be learned; in a free shuffle, a cluster
-    of samples would keep a most frequent label.
+    Each concept's samples then get every label equally often, or a cluster would keep a most frequent label.
     """
     random = generator(*axes, "labels", control)
     concept = train.concept.copy()
@@ -159,10 +143,9 @@ def encode(
     encoder: EncoderSettings,
     checkpoint: Path | None = None,
 ) -> tuple[dict[str, np.ndarray], list[dict[str, float]]]:
-    """Arrays of embeddings by an encoder that is trained like the paper's except for the control, and its curve.
+    """Return arrays of embeddings by an encoder that is trained like the paper's except for the control, and its curve.
 
-    With matched density every draw from a cloud, which is whole, has a random number of points. An encoder for unseen
-    objects sees no sample of them. Hard samples are of unseen objects already.
+    With matched density every draw from a whole cloud has a random number of points.
     """
     from gpca.encoders.training import embed, train_encoder
 

@@ -83,10 +83,7 @@ def _others(job: Job) -> dict[int, list[tuple[Path, Path]]]:
 
 
 def diagnose_frames(job: Job) -> None:
-    """Ask every explainer about the causes of registrations of depth frames -> their predictions.
-
-    They have learned from registrations whose causes were drawn, those of all sources, and from no frame.
-    """
+    """Ask explainers that learned from all sources about the causes of registrations of depth frames -> predictions."""
     import pandas as pd
 
     learned = {"causes": job.causes, DESCRIBED: job.descriptors, "encoders": job.encoders, EMBEDDINGS: job.embeddings}
@@ -117,9 +114,8 @@ def explained(
 ) -> Attribution:
     """Let an explainer learn from the training rows and explain all, and count the runs of ICP that it needs.
 
-    The causes are those of the file `path`, and `read` has what the explainer reads of them; `others` are the same
-    files of other sources, whose training rows are learned from too unless a family of theirs is tested. Files of
-    `further` samples are for an explainer that learns from these.
+    `read` has what the explainer reads of the causes of the file `path`; `others` are the same files of other sources,
+    whose training rows are learned from too unless a family of theirs is tested.
     """
     explainer = entry.made(*(causes.registrations.axes or ()), **settings)
     registrations = with_what_it_reads(labeled(causes), entry.reads, read)
@@ -175,15 +171,9 @@ def with_what_it_reads(registrations: Registrations, reads: str, path: Path | No
 class World:
     """Registrations that explainers which learned from objects are asked about: in depth frames, or of scans.
 
-    Diagnosis of held-out objects is :func:`diagnose`: there one file has training and test rows.
-
-    Args:
-        files: of all sources of objects, by what explainers read, and their encoders.
-        registrations: those of this world, with labels.
-        starts: runs of each from other starts.
-        read: gives the registrations with descriptors or re-enactments attached, by an explainer's `reads`.
-        fold_S: (S,) folds by which explainers learn from this world: from all but the one that they are asked about.
-        apart: no family of objects is learned from that explainers are asked about, in whatever source.
+    `read` gives them with descriptors or re-enactments attached, by an explainer's `reads`; explainers that learn from
+    this world do so from all folds (S,) but the one that they are asked about. With `apart`, no family of objects is
+    learned from that explainers are asked about.
     """
 
     def __init__(
@@ -208,8 +198,7 @@ class World:
     def prepare(self, name: str, learned_from: str = OBJECTS) -> list[tuple[Registrations, Registrations]]:
         """Return what an explainer learns from, and what it is asked about; the same twice if not objects.
 
-        Descriptors and re-enactments of all sources are one set; embeddings are by an encoder for each source. What
-        they are made of is measured once for all explainers that read the same.
+        Descriptors and re-enactments of all sources are one set; embeddings are by an encoder for each source.
         """
         from gpca.encoders.training import embed, load_model
 
@@ -236,10 +225,7 @@ class World:
         return self._prepared[reads, learned_from]
 
     def attribution(self, name: str, settings: dict, learned_from: str = OBJECTS) -> Attribution | None:
-        """Mean of the scores over all that the explainer reads; several are the encoders of embeddings.
-
-        None where it would have to learn from fewer than two classes.
-        """
+        """Return the mean of the scores over all encoders; None where it would learn from fewer than two classes."""
         entry, all_scores, all_abstained = explainer_entry(name, CAUSES), [], []
         for training, asked in self.prepare(name, learned_from):
             parts = [(np.arange(len(asked)), training)]

@@ -41,25 +41,16 @@ DESIGN = "additive"  # the design whose conditions are estimated
 
 @dataclass(frozen=True)
 class ExchangeSettings:
-    """The methods and estimators, and the numbers of registrations.
-
-    Attributes:
-        methods: registration methods, each used for training and for test registrations in turn.
-        train, test: registrations of each source and seed, by each of them, at most.
-        points: of source and of target that are registered, at most.
-        estimated_train: training registrations whose covariance is estimated, and as many others from which estimators
-            learn, at most.
-        estimated_test: test registrations that are explained by their uncertainty, at most.
-    """
+    """The methods and estimators, and the numbers of registrations of each source and seed, at most."""
 
     seeds: Count = 3
-    methods: Distinct[str] = ("point_to_point", "point_to_plane")
-    train: Annotated[int, Bounds(minimum=9, **BALANCED)] = 120
+    methods: Distinct[str] = ("point_to_point", "point_to_plane")  # for training and for test registrations in turn
+    train: Annotated[int, Bounds(minimum=9, **BALANCED)] = 120  # by each of them
     test: Annotated[int, Bounds(minimum=3, **BALANCED)] = 60
-    points: Annotated[int, Bounds(minimum=64, maximum=65536)] = 512
+    points: Annotated[int, Bounds(minimum=64, maximum=65536)] = 512  # of source and of target
     estimators: Distinct[str] = ("monte_carlo",)
-    estimated_train: Annotated[int, Bounds(minimum=9, **BALANCED)] = 24
-    estimated_test: Annotated[int, Bounds(minimum=3, **BALANCED)] = 9
+    estimated_train: Annotated[int, Bounds(minimum=9, **BALANCED)] = 24  # and as many from which estimators learn
+    estimated_test: Annotated[int, Bounds(minimum=3, **BALANCED)] = 9  # that are explained by their uncertainty
 
 
 def run(job: Job) -> None:
@@ -81,10 +72,7 @@ def run(job: Job) -> None:
 
 
 def require_exchangeable(name: str) -> None:
-    """Raise an InputError unless the explainer reads what is exchanged.
-
-    That is registrations, their embeddings, the conditions of design ``additive``, or the observed pair of any design.
-    """
+    """Raise an InputError if the explainer reads another design than ``additive``, or more than its observed pair."""
     entry = explainer_entry(name)
     if entry.design not in (None, DESIGN) and not entry.observed_only:
         fault = f"reads design '{entry.design}', which estimators do not provide"
@@ -93,28 +81,21 @@ def require_exchangeable(name: str) -> None:
 
 @dataclass(frozen=True)
 class Exchange:
-    """The methods and estimators that are exchanged for the explainers of one source and seed.
-
-    Attributes:
-        methods, estimators: name -> settings.
-        rivals: by name. Those that read an uncertainty get each estimator's, the others each method's registrations.
-        embed: registrations and the name of their source -> embeddings and logits of the head by the run's encoder.
-    """
+    """The methods and estimators that are exchanged for the explainers of one source and seed."""
 
     source: str
     seed: int
     settings: ExchangeSettings
-    methods: Mapping[str, Mapping]
+    methods: Mapping[str, Mapping]  # name -> settings, as of the estimators
     estimators: Mapping[str, Mapping]
     uncertainty: UncertaintySettings
-    rivals: Mapping[str, ExplainerEntry]
+    rivals: Mapping[str, ExplainerEntry]  # those that read an uncertainty get each estimator's, others each method's
     embed: Embed
 
     def run(self, registrations: Registrations, judges: Judges) -> Frame:
-        """Predictions of each explainer on the test samples: `LABELS`, the columns of a prediction file, `FAILURE`.
+        """Return predictions of each explainer: `LABELS`, the columns of a prediction file, `FAILURE`.
 
-        For methods, ``learnt_from`` registered the training pairs and ``asked_of`` the test pairs; for estimators they
-        are equal.
+        The method ``learnt_from`` registered the training pairs, ``asked_of`` the test pairs; of estimators, both.
         """
         import pandas as pd
 
@@ -199,10 +180,9 @@ def labeled(frame: Frame, labels: tuple[str, ...], failure_S: np.ndarray) -> Fra
 def registered_by(
     registrations: Registrations, methods: Mapping[str, Mapping], source: str, seed: int, points: int
 ) -> dict[str, tuple[Registrations, np.ndarray]]:
-    """Registrations by each method, and why each failed (S,), empty if it did not.
+    """Return the registrations by each method, and why each failed (S,), empty if it did not.
 
-    All methods get the same thinned clouds and the initial pose, which global ones do not read. The whole observed
-    cloud moves to the resulting pose; a registration that failed stays where the method left it, and counts.
+    All methods get the same thinned clouds; the whole observed cloud moves to the resulting pose, even of a failure.
     """
     made = {name: make_method(name, entry) for name, entry in methods.items()}
     outcomes: dict[str, list] = {name: [] for name in made}

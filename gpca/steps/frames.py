@@ -32,8 +32,7 @@ SHOWN_METHOD = "point_to_point"  # ICP as in the registrations that are shown
 def scenes(job: Job) -> None:
     """Lay table-top scenes of procedural objects, or of datasets' models, and render them -> a BOP dataset.
 
-    Models are those that all frames show, or those that no frame shows which may be tested. Those that cannot be
-    rendered or stood on a table are skipped, with a line on stderr.
+    Models that cannot be rendered or stood on a table are skipped, with a line on stderr.
     """
     from gpca.frames import dataset
     from gpca.frames.rgbd_scene import SceneSettings, stable_poses, write_scenes
@@ -93,10 +92,7 @@ def _instances(job: Job, name: str) -> tuple[Instances, ObjectClouds]:
 
 
 def instances(job: Job) -> None:
-    """Read models and frames of BOP datasets, back-project the masks and find the initial poses.
-
-    The outputs are ``instances/{source}.npz`` and the canonical clouds of the models.
-    """
+    """Read models and frames of BOP datasets -> instances with initial poses, and the models' canonical clouds."""
     from gpca.frames.dataset import distinct_surfaces, read_models, with_shared_models
     from gpca.frames.initial_pose import InitialPoseSettings
     from gpca.frames.instances import points_on_model, read_instances
@@ -186,10 +182,7 @@ def _errors(
 
 
 def reenact_frames(job: Job) -> None:
-    """Re-enact the registrations of depth frames -> ``reenactments/{source}/seed{seed}.npz``.
-
-    Of the truth's settings it reads how ICP runs, and the limits of the states.
-    """
+    """Re-enact the registrations of depth frames -> ``reenactments/{source}/seed{seed}.npz``."""
     from gpca.frames.dataset import meshes_of, models_of
     from gpca.frames.starts import Starts
     from gpca.reenactment.frames import reenact_frames

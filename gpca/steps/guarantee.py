@@ -1,9 +1,7 @@
 """Step ``guarantee_scores``: measured causes -> scores by models that were not trained on the families that they score.
 
 An explainer of descriptors or re-enactments is trained on one part of the families and scores all others. Predictions
-of explainers of embeddings are those of the diagnosis, since their encoders would have to be trained again: the models
-of a seed are trained on none of the families that they are tested on. Depth frames are scored by the explainers of the
-frames' causes.
+of explainers of embeddings are those of the diagnosis, and those of depth frames of the frames' causes.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -97,10 +95,7 @@ def run(job: Job) -> None:
 
 
 def scored_anew(registrations: Registrations, samples: Scored, name: str, settings: Mapping) -> Iterator[Scored]:
-    """Yield the scores of all samples by each model, which was trained on one part of the families.
-
-    Models that all give the same scores are not trained at all; they are one model that has seen no sample.
-    """
+    """Yield the scores of all samples by each model, trained on one part of the families; equal ones are one model."""
     hidden, part_N = observed_only(registrations), parts_of(registrations.cluster, registrations.fold)
     scores: dict[int, np.ndarray] = {}
     for part in np.unique(part_N).tolist():
@@ -116,10 +111,7 @@ def scored_anew(registrations: Registrations, samples: Scored, name: str, settin
 
 
 def scored_as_is(samples: Scored, prediction_files: Sequence[Path]) -> Iterator[Scored]:
-    """Yield the scores that the models of each source and seed gave in the diagnosis.
-
-    Models of one seed have one name: together they are one rule for a pair of any source.
-    """
+    """Yield the scores of the diagnosis; models of one seed have one name, as together they are one rule."""
     for path in prediction_files:
         seed = seed_of_file(path)
         own = samples.subset((samples.source == path.parts[-3]) & (samples.seed == seed))
@@ -135,10 +127,6 @@ def scored_on_frames(frames: Sequence[tuple[Path, Path, Path]], name: str, as_is
     """Yield an explainer's scores of depth frames, and those of the test samples for their calibration.
 
     Scenes whose true poses were made by ICP are left out. The weights of all starts of an instance add up to one.
-
-    Args:
-        frames: files of causes, samples and predictions of every seed.
-        as_is: results of :func:`scored_as_is`.
     """
     for causes_file, sample_file, prediction_file in frames:
         causes, samples = Causes.load(causes_file), read_csv(sample_file, FRAME_COLUMNS, others=ANY)

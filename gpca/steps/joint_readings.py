@@ -1,8 +1,4 @@
-"""The printed numbers of Tables I to V under joint readings: measured on development samples, searched, then run once.
-
-Each value is named by its part, under the choices that it depends on (:mod:`gpca.comparison.joint_reading`), and by
-method, metric and concept of its counterpart in published.csv.
-"""
+"""The printed numbers of Tables I to V under joint readings: measured on development samples, searched, and run."""
 
 from __future__ import annotations
 
@@ -54,16 +50,10 @@ Value = tuple[str, str, str, str, float]  # part, method, metric, concept, value
 
 @dataclass(frozen=True)
 class ReadingSamples:
-    """Samples of a source and seed.
+    """Samples of a source and seed."""
 
-    Attributes:
-        sets: with embeddings by an encoder that learned from samples of the same severities.
-        pairs: some of the test samples like the training's, for Monte-Carlo ICP.
-        axes: source and seed.
-    """
-
-    sets: ShiftedSets
-    pairs: Registrations
+    sets: ShiftedSets  # with embeddings by an encoder that learned from samples of the same severities
+    pairs: Registrations  # some of the test samples like the training's, for Monte-Carlo ICP
     axes: tuple[str, int]
 
     @classmethod
@@ -83,17 +73,11 @@ class ReadingSamples:
 
 @dataclass(frozen=True)
 class MeasureSettings:
-    """What joint readings leave as it is.
+    """What joint readings leave as it is."""
 
-    Attributes:
-        gpc: the paper's setting, of which the reading changes kernel, rate and iterations.
-        labels, target: the rounds of labels, and the accuracy that counts as reached.
-        uncertainty: Monte-Carlo ICP under the knobs.
-    """
-
-    gpc: dict[str, Any]
+    gpc: dict[str, Any]  # the paper's setting, of which the reading changes kernel, rate and iterations
     labels: ActiveLearningSettings
-    target: float
+    target: float  # accuracy that counts as reached
     uncertainty: UncertaintySettings
 
     @classmethod

@@ -33,19 +33,12 @@ BY_GPYTORCH = "_gpytorch"  # suffix of a kernel that is fitted in gpytorch's own
 
 @dataclass(frozen=True)
 class KernelGrid:
-    """The kernels and learning rates that are fitted, and the iterations at which they are evaluated.
+    """The kernels and learning rates that are fitted, and the iterations at which they are evaluated."""
 
-    Attributes:
-        kernels, learning_rates: every kernel is fitted at every rate.
-        iterations: counts at which the classifier is evaluated; it is fitted up to the largest.
-        gpytorch: kernels that are fitted once more in gpytorch's own classes, for comparison: with the printed
-            iterations at the larger rate, where both are in the grid.
-        inducing, draws: as of :class:`gpca.classifier.settings.GPCSettings`.
-    """
-
-    kernels: Distinct[Kernel] = ("rbf", "matern32", "polynomial")
+    kernels: Distinct[Kernel] = ("rbf", "matern32", "polynomial")  # each is fitted at every rate
     learning_rates: Distinct[LearningRate] = (0.01, 0.001)
-    iterations: Distinct[Count] = (10, 20, 50, 100, 200)
+    iterations: Distinct[Count] = (10, 20, 50, 100, 200)  # at which the classifier is evaluated
+    # Fitted once more in gpytorch's own classes, with the printed iterations at the larger rate
     gpytorch: Annotated[tuple[Kernel, ...], Different(fewest=0)] = ()
     inducing: Count = 64
     draws: Draws = 1000
@@ -65,10 +58,9 @@ def run(job: Job) -> None:
 
 
 def evaluate_grid(registrations: Registrations, grid: KernelGrid, source: str, seed: int) -> tuple[Frame, Frame]:
-    """Rows of :data:`GRID_COLUMNS`, and the predictions of the test samples, which have `SETTING` as first columns.
+    """Return `GRID_COLUMNS`, and the predictions of the test samples, which have `SETTING` as first columns.
 
-    Each row equals that of a separate fit of that many iterations to the training samples alone. `elbo` is per
-    training sample in nats, `confidence` the mean of the largest score.
+    `elbo` is per training sample in nats, `confidence` the mean of the largest score.
     """
     import pandas as pd
 

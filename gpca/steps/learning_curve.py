@@ -38,21 +38,13 @@ CURVE_COLUMNS = ("learner", "samples", "order", *MEASURED)
 
 @dataclass(frozen=True)
 class CurveSettings:
-    """The training samples, and the learners of them.
-
-    Attributes:
-        further: training samples of each source, of all its objects, that are drawn besides those of the causes; all
-            have a label, and no explainer learns from those of families that it is asked about.
-        chunk: how many of them a job draws, at most.
-        sizes: numbers of labeled training samples that are learned from.
-        orders: number of orders of the samples; a size takes the first samples of each.
-    """
+    """The training samples, and the learners of them."""
 
     seeds: Count = 1
-    further: Annotated[int, Bounds(minimum=12)] = 90
-    chunk: Annotated[int, Bounds(minimum=12)] = 600
-    sizes: Distinct[Annotated[int, Bounds(minimum=FEWEST)]] = (50, 100, 200)
-    orders: Count = 3
+    further: Annotated[int, Bounds(minimum=12)] = 90  # labeled samples of each source besides those of the causes
+    chunk: Annotated[int, Bounds(minimum=12)] = 600  # of them that a job draws, at most
+    sizes: Distinct[Annotated[int, Bounds(minimum=FEWEST)]] = (50, 100, 200)  # numbers of samples that are learned from
+    orders: Count = 3  # of the samples; a size takes the first samples of each
     classifier: GPCSettings = field(default_factory=GPCSettings)
 
     def chunks(self) -> list[int]:
@@ -82,9 +74,8 @@ def learning_samples(job: Job) -> None:
 def describe(causes: Causes, icp: ICPSettings) -> LabeledSamples:
     """Labels of all rows, and those descriptors that need no further registration."""
     rows: list[tuple[np.ndarray, ...]] = []
-    for row in progress(
-        range(len(causes)), "descriptors of {}, seed {}".format(*(causes.registrations.axes or ("", 0)))
-    ):
+    title = "descriptors of {}, seed {}".format(*(causes.registrations.axes or ("", 0)))
+    for row in progress(range(len(causes)), title):
         pair = observed_pair(causes, row)  # nothing in these is random
         rows.append((*describe_distances(pair), describe_motion(pair), describe_starts(pair, icp)))
     groups: dict[str, Any] = {name: np.array([row[i] for row in rows]) for i, name in enumerate(QUICK)}
@@ -118,11 +109,9 @@ def learn_from_more(job: Job) -> None:
 def learning_curve(
     pool: LabeledSamples, tested: LabeledSamples, truth: Causes, settings: CurveSettings, source: str, seed: int
 ) -> Frame:
-    """Row of `CURVE_COLUMNS` for each learner, size and order, and one of the truth from other starts.
+    """Return `CURVE_COLUMNS` for each learner, size and order, and a row of the truth from other starts.
 
-    An order is a permutation of the pool; a smaller size is part of a larger one in the same order. Sizes above that of
-    the pool, which lacks the families that are tested, have no row. The tested samples
-    are those of the truth.
+    An order is a permutation of the pool, which lacks the families that are tested; larger sizes have no row.
     """
     import pandas as pd
 

@@ -62,11 +62,7 @@ def uncertainty(job: Job) -> None:
 
 
 def train(job: Job) -> None:
-    """Train an encoder on registrations -> its weights and training curve.
-
-    A checkpoint lies beside the weights until they are written. The encoder of depth frames starts from one that was
-    trained on the registrations of all sources together.
-    """
+    """Train an encoder on registrations, perhaps from the weights of another -> its weights and training curve."""
     import pandas as pd
 
     from gpca.encoders.training import load_model, train_encoder, write_weights
@@ -82,9 +78,7 @@ def train(job: Job) -> None:
     # Clouds of frames are as small as objects look, so some of their points are drawn twice; others are as configured.
     if poses is None and settings.draw_points > (most := int(np.diff(registrations.offsets).max())):
         fault = f"the largest cloud has {most} points, fewer than draw_points, {settings.draw_points}"
-        raise InputError(
-            job.files("registrations")[0], fault, "lower draw_points, or raise cloud_points of registrations"
-        )
+        raise InputError(files[0], fault, "lower draw_points, or raise cloud_points of registrations")
     instance_S = read_instances_of(poses, registrations) if poses else None
     start = load_model(weights, settings).state_dict() if weights else None
     # This is no output of the rule: Snakemake removes those before a rerun, and the rerun is what needs it.

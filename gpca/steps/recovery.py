@@ -136,9 +136,6 @@ def register_situations(
     """Register situations of all causes, failed or not, from which explainers and the gate learn and are calibrated.
 
     Episodes 3t to 3t + 2 of a split are of the three causes. The calibration samples are the split ``test``.
-
-    Args:
-        situations: those of ``train`` and ``test``, which share no table.
     """
     registered: dict[str, list[Episode]] = {"train": [], "test": []}
     for split, count in (("train", train), ("test", calibration)):
@@ -167,10 +164,7 @@ def as_samples(registered: Mapping[str, Iterable[Episode]]) -> Registrations:
 
 
 def choose_example(rows: Frame) -> int:
-    """The episode that is shown: of overlap, by GP-CA's policy a new view solved it, its score the median.
-
-    Where there is none such, the narrower wishes are dropped from the last on.
-    """
+    """Return the episode that is shown: of overlap, solved by a new view by GP-CA's policy, its score the median."""
     shown = "gpca" if (rows["policy"] == "gpca").any() else rows["policy"].iloc[0]
     first = rows[rows["failed"] & (rows["step"] == 1) & (rows["policy"] == shown)]
     for wish in (first["cause"] == "overlap", first["action"] == ACTION, first["recovered"]):
@@ -191,13 +185,8 @@ def save_example(
 ) -> None:
     """Write the npz: of the ``first`` and the ``next`` view the image and silhouettes; scores, errors; viewpoints.
 
-    Silhouettes are those of the visible part of the object, of the whole object, and of the model where ICP put it. For
-    each viewpoint that was to choose from there is the direction to it and the share of the model's surface that was
-    expected to have been seen after it.
-
-    Args:
-        views: settings of the action that changes the viewpoint.
-        axes: the source and the seed that the file is of.
+    Silhouettes are those of the visible part of the object, of the whole object, and of the model where ICP put it.
+    Viewpoints have the share of the model's surface that was expected to have been seen after them.
     """
     episode = next(e for e in episodes if e.number == choose_example(rows))
     shown = rows[(rows["episode"] == episode.number) & (rows["step"] == 1)]

@@ -63,12 +63,9 @@ def measure(
     threads: int,
     *axes: object,
 ) -> Frame:
-    """A row per component and device: mean, standard deviation and median over the repeats, in seconds.
+    """Return a row per component and device: mean, standard deviation and median over the repeats, in seconds.
 
-    A repeat goes once through all components with the next test registration, so that whatever else the machine does
-    meets all of them.
-
-    The axes name the draws; BALD selects from the pool of the task, which is not projected yet.
+    A repeat goes once through all components, so that whatever else the machine does meets all of them.
     """
     import pandas as pd
     import torch

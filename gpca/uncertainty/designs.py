@@ -1,8 +1,4 @@
-"""Which conditions of a pair are run for which question, and how they are run for many registrations.
-
-A design is a fixed list of K conditions for every registration. Condition `reference` is the clean run against which
-the uncertainty of the others is measured.
-"""
+"""Which conditions of a pair are run for which question, and how they are run for many registrations."""
 
 from __future__ import annotations
 
@@ -65,10 +61,7 @@ class RegisteredRow:
         return source, self.target[:points], np.eye(4), np.eye(4)
 
     def true_knobs(self, settings: UncertaintySettings) -> Knobs:
-        """Return the knobs that make what was perturbed; NaN where that is hidden.
-
-        A pose error counts by how many times it is as large as the starts' usual one, by angle or by length.
-        """
+        """Return the knobs that make what was perturbed, a pose error in units of the starts' one; NaN if hidden."""
         angle = np.rad2deg(self._severity["rotation_rad"]) / settings.start_rotation_deg
         length = self._severity["translation"] / settings.start_translation
         spread = np.max([UNTOUCHED.spread, angle, length])
@@ -134,10 +127,7 @@ DESIGNS = {
 
 
 def design_rows(registrations: Registrations, design: str, samples: int | None) -> np.ndarray:
-    """Return the rows that a design evaluates: of its splits, the first `samples` test samples (all if None).
-
-    Samples come in threes, one object under the three concepts, round the objects: the first ones are stratified.
-    """
+    """Return the rows that a design evaluates: of its splits, the first `samples` test samples (all if None)."""
     subject = f"uncertainty '{design}'"
     if samples is not None and samples % len(CONCEPTS):
         raise InputError(subject, f"{samples} samples do not balance the concepts", "give a multiple of 3")

@@ -28,28 +28,17 @@ JUDGED = (*OF_REFERENCES, "error_ratio", "mahalanobis", "spread")  # the last th
 
 @dataclass(frozen=True)
 class EstimatorPairSettings:
-    """The registrations whose covariance is estimated, and the reference that estimates are compared with.
+    """The registrations whose covariance is estimated, and the reference that estimates are compared with."""
 
-    Attributes:
-        methods: registration method -> test registrations of each source and seed, at most.
-        train: training registrations by each method, for estimators that learn, at most.
-        train_starts: runs of each of them, with other data and starts.
-        points: of source and of target (fewer where a cloud has fewer).
-        repeats: registrations of each reference.
-        start_rotation_deg, start_translation: root mean square angle and length of all starts' offsets.
-        floor: variance that is added to every covariance before it is judged; a spread below it counts as none.
-        failed: error from which a registration has failed, ADD or ADD-S in diameters: the config's ``success.error``.
-    """
-
-    methods: dict[str, Annotated[int, Bounds(minimum=1, maximum=100_000)]]
-    train: Annotated[int, Bounds(minimum=8)]
-    train_starts: Annotated[int, Bounds(minimum=7, maximum=1000)]
-    points: Annotated[int, Bounds(minimum=64, maximum=65536)]
-    repeats: Annotated[int, Bounds(minimum=20, maximum=100_000)]
-    start_rotation_deg: Annotated[float, Bounds(exclusiveMinimum=0, maximum=180)]
+    methods: dict[str, Annotated[int, Bounds(minimum=1, maximum=100_000)]]  # test registrations of each source and seed
+    train: Annotated[int, Bounds(minimum=8)]  # registrations by each method, for estimators that learn, at most
+    train_starts: Annotated[int, Bounds(minimum=7, maximum=1000)]  # runs of each of them, with other data and starts
+    points: Annotated[int, Bounds(minimum=64, maximum=65536)]  # of source and of target, at most
+    repeats: Annotated[int, Bounds(minimum=20, maximum=100_000)]  # registrations of each reference
+    start_rotation_deg: Annotated[float, Bounds(exclusiveMinimum=0, maximum=180)]  # root mean square of starts' offsets
     start_translation: Annotated[float, Bounds(exclusiveMinimum=0, maximum=10)]
-    floor: Annotated[float, Bounds(exclusiveMinimum=0, maximum=1)]
-    failed: PositiveShare
+    floor: Annotated[float, Bounds(exclusiveMinimum=0, maximum=1)]  # variance added to every covariance that is judged
+    failed: PositiveShare  # the config's ``success.error``, in diameters
 
 
 def covariance_columns(covariance_6_6: np.ndarray | None) -> dict[str, float]:

@@ -1,9 +1,8 @@
 """Interventions on a pair whose uncertainty answers: perturbations as knobs, and remedies as switches.
 
-The registration's uncertainty is a function f(noise, spread, overlap) of the knobs (Qin et al. 2024); SHAP and
-sensitivity analysis explain that function. Jitter, direction of the cut and starts are drawn once per pair, so that two
-settings differ by the knobs alone. Remedies are for a pair whose cause is to be found: denoise, restart more broadly,
-trim to the overlap. Whichever lowers the uncertainty points to the cause, and what was perturbed is not known.
+The registration's uncertainty is a function f(noise, spread, overlap) of the knobs (Qin et al. 2024), which SHAP and
+sensitivity analysis explain. Jitter, direction of the cut and starts are drawn once per pair. A remedy (denoising,
+broader restarts, trimming to the overlap) that lowers the uncertainty points to the cause.
 """
 
 from dataclasses import replace
@@ -97,10 +96,7 @@ FEWEST_TRIMMED = 16  # where a trimmed target would have fewer, nothing is trimm
 
 
 class RemedyRuns:
-    """Runs of one observed pair under every combination of remedies.
-
-    ICP sees fewer of the clouds' points than denoising and the residual do; the reference pose is that of ICP.
-    """
+    """Runs of one observed pair under every combination of remedies; the reference pose is that of ICP."""
 
     def __init__(self, clouds: Clouds, draws: PairDraws) -> None:
         source, self._target, self._T_init, self._T_icp = clouds

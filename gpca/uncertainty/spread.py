@@ -80,10 +80,7 @@ def summarize_runs(
     settings: UncertaintySettings,
     started: float,
 ) -> Spread:
-    """Summarize the runs of one condition, whose work began at `started`, by the ``perf_counter``.
-
-    The tree is of the source's points, in its own frame; the residual is that of `target` (Q, 3).
-    """
+    """Summarize the runs of one condition, whose work began at `started`; the residual is that of `target` (Q, 3)."""
     best = runs.T_target_source_n[runs.cost_n(settings.icp.correspondence_distance).argmin()]
     return Spread(
         covariance=runs.covariance(T_ref),

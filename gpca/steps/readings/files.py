@@ -18,6 +18,7 @@ from gpca.jobs.provenance import record_provenance
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.shifted_sets import ShiftedSets
+from gpca.process.registry import load
 from gpca.seeds import seed_of_file
 from gpca.steps.readings.groups import GROUPS, Reading, ReadingSizes, name_of, readings_of
 from gpca.uncertainty.settings import UncertaintySettings
@@ -29,22 +30,14 @@ Files = Mapping[tuple, Path]
 
 @dataclass(frozen=True)
 class RunFiles:
-    """Paths of a run's files.
+    """Paths of a run's files."""
 
-    Attributes:
-        registrations, sets: (source, seed) -> file of the step ``registrations`` or ``shift``.
-        predictions, embeddings: (source, method, seed) -> file.
-        retrained: (severities, source, seed) -> file of the step ``retrain``.
-        settings: sections of the config by name, for what a reading leaves as it is.
-        sizes: of what the readings see.
-    """
-
-    registrations: Files = field(default_factory=dict)
+    registrations: Files = field(default_factory=dict)  # by source and seed
     sets: Files = field(default_factory=dict)
-    predictions: Files = field(default_factory=dict)
+    predictions: Files = field(default_factory=dict)  # by source, method and seed
     embeddings: Files = field(default_factory=dict)
-    retrained: Files = field(default_factory=dict)
-    settings: Mapping[str, dict] = field(default_factory=dict)
+    retrained: Files = field(default_factory=dict)  # by severities, source and seed
+    settings: Mapping[str, dict] = field(default_factory=dict)  # sections of the config by name
     sizes: ReadingSizes = field(default_factory=ReadingSizes)
 
     def section(self, name: str) -> dict:
@@ -99,7 +92,7 @@ def run(job: Job) -> None:
         run_files = RunFiles(**files, settings=job.settings, sizes=ReadingSizes(**job.section("sizes")))
         records = [
             (name_of(job.group, reading), source, method, metric, concept, seed, value)
-            for reading, source, method, seed, values in group.function()(run_files, readings)
+            for reading, source, method, seed, values in load(group.code)(run_files, readings)
             for (metric, concept), value in values.items()
         ]
         if not records:

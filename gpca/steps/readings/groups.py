@@ -3,13 +3,12 @@
 A reading is a combination of the values of a group's choices. ``config/readings.yaml`` has the values that are tried.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Annotated, Any, Literal
 
 from gpca.classifier.settings import Kernel, LearningRate
-from gpca.process.registry import load
 from gpca.settings import Bounds, Count, Distinct, Keys, OpenShare, Positive
 
 FRAME_REPEATS = "frames"  # the group that fits classifiers to depth frames anew
@@ -30,17 +29,11 @@ Reading = Mapping[str, Any]  # choice -> value
 
 @dataclass(frozen=True)
 class ReadingSizes:
-    """The seeds and samples that the readings of a run see.
+    """The seeds and samples that the readings of a run see."""
 
-    Attributes:
-        seeds: number of the run's seeds that are used, from the first.
-        encoders: number of these seeds for which other encoders are trained.
-        samples: test samples of each source and seed on which Monte-Carlo ICP is run, balanced, at most.
-    """
-
-    seeds: Count = 2
-    encoders: Annotated[int, Bounds(minimum=0)] = 1
-    samples: Annotated[int, Bounds(minimum=3, multipleOf=3)] = 15
+    seeds: Count = 2  # the first so many of the run's
+    encoders: Annotated[int, Bounds(minimum=0)] = 1  # the first so many of these, for which other encoders are trained
+    samples: Annotated[int, Bounds(minimum=3, multipleOf=3)] = 15  # test samples for Monte-Carlo ICP, balanced, at most
 
 
 def readings_of(choices: Mapping[str, Sequence]) -> list[Reading]:
@@ -55,28 +48,16 @@ def name_of(group: str, reading: Reading) -> str:
 
 @dataclass(frozen=True)
 class Group:
-    """A group of choices that the paper leaves open.
+    """A group of choices that the paper leaves open."""
 
-    Attributes:
-        title: the open question in words.
-        choices: the type of a value of each.
-        run: ``module:function`` beside this module, of a :class:`gpca.steps.readings.files.RunFiles`, readings and
-            their sizes, that yields rows named as in published.csv.
-        reads: kinds of files, fields of a RunFiles.
-        sources: those whose printed numbers are compared; empty for depth frames.
-        methods: explainers or learners whose predictions it reads.
-        explainers: those that it fits itself.
-        costly: it takes minutes a seed, so it sees the first seed alone.
-    """
-
-    title: str
-    choices: Mapping[str, Any]
-    run: str
-    reads: tuple[str, ...]
-    sources: tuple[str, ...] = ALL_SOURCES
-    methods: tuple[str, ...] = ()
-    explainers: tuple[str, ...] = ()
-    costly: bool = False
+    title: str  # the open question in words
+    choices: Mapping[str, Any]  # the type of a value of each
+    run: str  # ``module:function`` beside this module, of RunFiles and readings, that yields rows
+    reads: tuple[str, ...]  # kinds of files, fields of a RunFiles
+    sources: tuple[str, ...] = ALL_SOURCES  # whose printed numbers are compared; none for depth frames
+    methods: tuple[str, ...] = ()  # explainers or learners whose predictions it reads
+    explainers: tuple[str, ...] = ()  # that it fits itself
+    costly: bool = False  # minutes a seed, so that it sees the first seed alone
 
     @property
     def values(self) -> Any:
@@ -88,10 +69,6 @@ class Group:
     def code(self) -> str:
         """``module:function`` that runs it."""
         return f"{__package__}.{self.run}"
-
-    def function(self) -> Callable:
-        """The function that runs it."""
-        return load(self.code)
 
 
 GROUPS = {

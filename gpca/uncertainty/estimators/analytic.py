@@ -1,8 +1,4 @@
-"""Covariances of what the method finds from other starts, and in closed form from the derivatives of ICP's cost.
-
-Those in closed form, for the matches at the pose that was found, model how the estimate changes with the sensor's
-noise, and nothing else.
-"""
+"""Covariances of what the method finds from other starts, and in closed form, which model the sensor's noise alone."""
 
 import numpy as np
 
@@ -47,10 +43,7 @@ def brossard(registered: RegisteredPair, noise: float = 0.0, bias: float = 0.0) 
 
 
 def unscented(registered: RegisteredPair) -> np.ndarray:
-    """Return the covariance (6, 6) of the results from starts at ±√6 σ along each axis, about their mean.
-
-    The middle sigma point has no weight, as in a transform of κ = 0; it is the registration itself.
-    """
+    """Return the covariance (6, 6) of the results from starts at ±√6 σ along each axis (κ = 0), about their mean."""
     offsets_6_6 = np.sqrt(6) * np.diag(registered.deviation_6)
     twists_m_6 = registered.twists_from(np.concatenate([offsets_6_6, -offsets_6_6]))
     return np.cov(twists_m_6, rowvar=False, bias=True)
@@ -59,7 +52,6 @@ def unscented(registered: RegisteredPair) -> np.ndarray:
 def bonnabel(registered: RegisteredPair, noise: float = 0.0) -> np.ndarray:
     """Return Σ = σ² (Σ JᵀJ)⁻¹ of point-to-plane ICP (Bonnabel, Barczyk & Goulette, ACC 2016).
 
-    Between points and planes a match may slide along its plane and costs nothing, so matches that change do no harm.
     Between points the same formula makes the pose look held where it is not. σ, `noise`, is the standard deviation of
     the distances from planes, in diameters; with 0 it is estimated from them.
     """

@@ -28,11 +28,8 @@ def learn_cello(
     """Learn a metric of descriptors that finds similar training pairs (CELLO-3D, Landry et al., ICRA 2019).
 
     The covariance is the mean of the training pairs' covariances with weights exp(-|L (φ - φ')|²). L is diagonal,
-    chosen so that the runs of each training pair are likely under the covariance that the others give it. It models how
-    results vary between the runs that it learns from; an error that all runs of a pair share is not modeled.
-
-    Axes of a pair have no common sign, over which the covariance between two of them averages out: what is learned are
-    the six variances along the principal axes of the target (:func:`intrinsic_frame`). `components` are of a PCA.
+    chosen so that the runs of each training pair are likely under the covariance that the others give it. Axes of pairs
+    have no common sign, so that six variances along the principal axes of the target are learned.
     """
     import torch
 
@@ -68,10 +65,7 @@ def learn_cello(
 
 
 class Reduction:
-    """Descriptors, standardized and limited, onto their first principal components, at most one fewer than pairs.
-
-    Along any other axis these do not differ, and another pair would lie infinitely far away.
-    """
+    """Descriptors, standardized and limited, onto their first principal components, at most one fewer than pairs."""
 
     def __init__(self, descriptors_E_F: np.ndarray, components: int) -> None:
         self._mean_F, deviation_F = descriptors_E_F.mean(axis=0), descriptors_E_F.std(axis=0)

@@ -1,8 +1,4 @@
-"""The posterior of a pose given these clouds, drawn by Bayesian ICP (Langevin dynamics) and by Stein ICP.
-
-Where the likelihood is right and points are many, it is as wide as the estimate's distribution over clouds measured
-again (the theorem of Bernstein and von Mises).
-"""
+"""The posterior of a pose given these clouds, drawn by Bayesian ICP (Langevin dynamics) and by Stein ICP."""
 
 from collections.abc import Callable
 from functools import partial
@@ -97,11 +93,7 @@ BETA_1, BETA_2, EPSILON = 0.9, 0.999, 1e-8  # Adam's defaults, as the authors ta
 def stein_icp(
     registered: RegisteredPair, particles: int = 100, steps: int = 150, batch: int = 150, learning_rate: float = 0.01
 ) -> np.ndarray:
-    """Return the covariance of particles that go from prior to posterior by SVGD (Maken et al., RA-L 2022).
-
-    By Stein variational gradient descent (Liu & Wang 2016), particles are drawn to where the posterior is high and
-    repel each other by the kernel's slope.
-    """
+    """Return the covariance of particles that go from prior to posterior by SVGD (Maken et al., RA-L 2022)."""
     posterior = Posterior(registered)
     random = generator("stein_icp", registered.pair.seed)
     slope = partial(posterior.slope_of_batch, batch=batch, random=random)

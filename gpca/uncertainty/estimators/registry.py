@@ -34,8 +34,7 @@ def make_estimator(
 ) -> Callable[[RegisteredPair], CovarianceEstimate]:
     """Return an estimator as a function from registered pairs to estimates; one that learns needs examples.
 
-    A failure inside it, at learning too, becomes an estimate that says why. So does a registration without any
-    correspondence. Unknown names and settings, and missing examples, raise an InputError.
+    A failure inside it, at learning too, becomes an estimate that says why. Missing examples raise an InputError.
     """
     settings = dict(settings or {})
     require_estimator_settings(name, settings)

@@ -1,8 +1,4 @@
-"""Conditions of SHAP's and sensitivity analysis' design, with any estimator's covariance in place of Monte-Carlo's.
-
-Clouds, jitter and cut are those of design ``additive`` (:mod:`gpca.uncertainty.designs`). The spread of the starts is
-the prior of an estimator, and has no effect on one that reads no start.
-"""
+"""Conditions of design ``additive``, with any estimator's covariance in place of Monte-Carlo's."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

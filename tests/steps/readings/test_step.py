@@ -12,6 +12,7 @@ from gpca.evaluation.measures import read_metrics
 from gpca.experiments import reading_words
 from gpca.experiments.reading_words import NUMBERS, WORDS
 from gpca.process.code_files import ROOT
+from gpca.process.registry import load
 from gpca.steps.readings.groups import GROUPS, name_of, readings_of
 from tests.steps.by_words import main
 
@@ -84,7 +85,7 @@ def test_the_grid_has_every_group_and_each_has_a_function():
     assert list(GRID) == list(GROUPS)
     for name, group in GROUPS.items():
         assert list(GRID[name]) == list(group.choices)
-        assert callable(group.function())
+        assert callable(load(group.code))
         assert set(group.reads) <= {"registrations", "sets", "predictions", "embeddings", "retrained"}
         assert len({name_of(name, reading) for reading in readings_of(GRID[name])}) == len(readings_of(GRID[name]))
 
