@@ -48,7 +48,7 @@ def refusing(subject: object, fault: str, remedy: str) -> Iterator[None]:
     """Raise an InputError for any other error, whose message takes the place of ``{}`` in the fault."""
     try:
         yield
-    except InputError:
+    except (InputError, ModuleNotFoundError):
         raise
     except Exception as error:
         raise InputError(subject, fault.replace("{}", str(error)), remedy) from error

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from gpca.model.explanation import ExplainedRegistration, Explanation
 
 FAULTY_STATUS = 2  # exit code; 1 is a failed check
-FORMATS = "PLY, PCD, OBJ, STL, OFF, VTK, glb, npy, npz, xyz, txt, asc, pts, csv, bin of KITTI or nuScenes, LAS, E57"
+FORMATS = "PLY, PCD, OBJ, STL, OFF, VTK, glb, npy, npz, xyz, txt, asc, pts, csv, bin of KITTI or nuScenes"
 FIGURE = "gpca.model.explanation_figure"  # by name: only this needs matplotlib
 OBJECT_OPTIONS = ("model", "fast", "queue", "png", "repair")  # they need a model of objects
 OF_ONE = ("html", "png", "save_pose", "out")  # outputs of one registration

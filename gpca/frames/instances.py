@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,7 +18,7 @@ from gpca.io.container import FLAG, FLOAT, Container, array
 from gpca.objects.bop import find_symmetries
 from gpca.objects.canonical import DRAWN, ObjectClouds, unseen
 from gpca.process.progress import progress
-from gpca.rigid import inverse, transform
+from gpca.rigid import inverse
 from gpca.seeds import generator, seed_of
 
 NO_COLOR = "none"
@@ -89,8 +89,7 @@ def points_on_model(instances: Instances, objects: ObjectClouds, most_points: in
     medians_m = []
     for i, index in enumerate(instances.object_index):
         points_m = plausibility.spread(instances.cloud_m(i), most_points or len(instances.points_m))
-        points_m = transform(inverse(instances.T_camera_object_true[i]), points_m)
-        medians_m.append(plausibility.median_distance(trees[index], points_m))
+        medians_m.append(plausibility.median_distance(trees[index], instances.T_camera_object_true[i], points_m))
     return np.array(medians_m)
 
 
@@ -124,17 +123,17 @@ def read_instances(
         for number, i in index.items():
             if models[number].listed_symmetries is None:
                 symmetric[number] = bool(find_symmetries(objects.points(i), objects.diameters_m[i]))
-        observations = []
+        off: list[tuple[float, float]] = []  # distance and diameter of each object
         for frame in progress(frames, f"frames of {dataset.name}"):
             depth_m = frame.depth_m()
             for n, annotation in enumerate(frame.annotations):
                 number, T_camera_model = annotation.object_id, annotation.T_camera_model
                 T_model_object, diameter_m = models[number].T_model_object, float(objects.diameters_m[index[number]])
+                at = trees[number], T_camera_model @ T_model_object
                 try:
                     points_m, pixels = measured_points(frame, annotation, depth_m)
-                    place = annotation.subject, T_camera_model, T_model_object, trees[number], diameter_m
-                    observed = plausibility.MeasuredObject(*place, points_m)
-                    plausibility.require_plausible(observed)
+                    some_m = plausibility.spread(points_m, plausibility.JUDGED_POINTS)
+                    plausibility.require_near(annotation.subject, plausibility.median_distance(*at, some_m), diameter_m)
                     points_m, pixels = without_background(points_m, pixels, annotation, diameter_m)
                 except TooFewPoints as fault:
                     left_out.append(str(fault))
@@ -148,13 +147,16 @@ def read_instances(
                     "fold": dataset.fold(frame.scene),
                     "object_index": index[number],
                     "symmetric": symmetric[number],
-                    "T_camera_object_true": T_camera_model @ T_model_object,
+                    "T_camera_object_true": at[1],
                     "points_m": points_m.astype(np.float32),
                     "pixels": pixels.astype(np.int32),
                 }
                 seen.append(_Seen(frame, n, T_model_object, diameter_m, row))
-                observations.append(replace(observed, points_m=row["points_m"]))
-        plausibility.require_shared_form(dataset.name, observations)
+                some_m = plausibility.spread(row["points_m"], plausibility.JUDGED_POINTS)
+                off.append((plausibility.median_distance(*at, some_m), diameter_m))
+        if off:
+            subject = f"{seen[-1].annotation.subject}, and the others of dataset {dataset.name}"
+            plausibility.require_fitting(subject, *zip(*off, strict=True))
     if not seen:
         reasons = f"; the first skipped: {left_out[0]}" if left_out else ""
         raise InputError(", ".join(datasets), f"no object is left in any frame{reasons}", "check masks and depth")

@@ -41,7 +41,7 @@ POSES = (
     "give 4×4 or 3×4 numbers of T_target_source, row by row, or one line of TUM, [time] tx ty tz qx qy qz qw, as text "
     "or npy"
 )
-SUFFIXES = (*mesh_folder.SUFFIXES, ".pcd", *point_files.TABLE_READERS, *point_files.PACKAGES)
+SUFFIXES = (*mesh_folder.SUFFIXES, ".pcd", *point_files.TABLE_READERS)
 UNIT_QUATERNION = 1e-3  # largest error of its length
 FARTHEST_START = 10.0  # largest distance from the target's center to the source, in diameters of the target
 MEASURES = ("size", "depth", "closure")
@@ -67,7 +67,7 @@ def require_format(path: Path) -> None:
 def read_points(path: Path) -> np.ndarray:
     """Read a cloud of any size, or sample a mesh: points (N, 3) in the file's unit, with rows without a measurement.
 
-    Raises InputError for a file that is missing, unreadable or of another format, a missing package, too few points,
+    Raises InputError for a file that is missing, unreadable or of another format, too few points,
     or a mesh with NaN or without area.
     """
     return _read(path)[0]
@@ -85,9 +85,7 @@ def _read(path: Path) -> tuple[np.ndarray, CanonicalFrame | None]:
     if suffix == ".pcd":
         points = point_files.parse_pcd(path.read_bytes(), path)
     elif suffix not in mesh_folder.SUFFIXES:
-        points = (point_files.read_table if suffix in point_files.TABLE_READERS else point_files.read_scanner_file)(
-            path
-        )
+        points = point_files.read_table(path)
     else:
         surface = mesh_folder.read_surface(path, 1.0)
         points = surface.vertices_m

@@ -1,30 +1,22 @@
-"""Downloads kept in a cache and checked by SHA-256, and archives (zip, tar, tgz) unpacked without trusting them."""
+"""Downloads kept in a cache and checked by SHA-256, and archives (zip, tar, tgz) unpacked."""
 
-import gzip
 import math
 import re
 import shutil
-import stat
 import sys
 import tarfile
 import zipfile
-import zlib
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import partial
-from pathlib import Path, PureWindowsPath
-from typing import IO, Any
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
 from urllib.parse import urlsplit
 
-from gpca.errors import InputError
-from gpca.io.files import LARGEST_FILE_BYTES, require_file, sha256_of_file, whole_file, whole_folder
+from gpca.errors import InputError, refusing
+from gpca.io.files import require_file, sha256_of_file, whole_file, whole_folder
 
 TIMEOUT_S = 30
 LARGEST_UNPACKED_BYTES = 20 * 10**9  # the largest archive of the BOP benchmark unpacks to somewhat less
 REMEDY = "delete it and fetch it again, or check the url"
-_DAMAGE = (tarfile.TarError, zipfile.BadZipFile, gzip.BadGzipFile, EOFError, zlib.error, NotImplementedError)
-_TWO_IN_ONE_PLACE = (FileExistsError, IsADirectoryError, NotADirectoryError)  # a member that is a file and a folder
 
 
 def fetch(url: str, sha256: str | None, folder: str | Path, location: str | None = None) -> Path:
@@ -77,95 +69,41 @@ def _check(path: Path, expected: str | None, url: str, remedy: str) -> str:
     return actual
 
 
-@dataclass(frozen=True)
-class Member:
-    """A regular file in an archive: its relative path there, its size in bytes, and what opens a stream of it."""
-
-    archive: Path
-    name: str
-    size: int
-    open: Callable[[], IO[bytes]]
-
-    def read(self) -> bytes:
-        """Return the content; InputError when it is damaged, or too large to be parsed."""
-        if self.size > LARGEST_FILE_BYTES:
-            most = f"more than the limit of {LARGEST_FILE_BYTES / 1e9:.3g} GB"
-            raise InputError(self.archive, f"member '{self.name}' is {self.size / 1e9:.3g} GB, {most}", REMEDY)
-        with _damage_named(self.archive), self.open() as stream:
-            return stream.read()
-
-
-@contextmanager
-def open_archive(path: str | Path, largest_bytes: int = LARGEST_UNPACKED_BYTES) -> Iterator[list[Member]]:
-    """Yield the regular files of an archive; InputError for damage, links, devices, ways out of it, or too many bytes.
-
-    The filters of the standard library let links pass, and strip a leading slash in silence.
-    """
-    path = Path(path)
-    require_file(path, "no such file", "check url or files in the config", math.inf)
-    with _damage_named(path), path.open("rb") as file:
-        magic = file.read(2)
-        mode: Any = "r:gz" if magic == b"\x1f\x8b" else "r:"
-        archive = zipfile.ZipFile(path) if magic == b"PK" else tarfile.open(path, mode)  # noqa: SIM115
-    members, total = [], 0
-    with archive:
-        with _damage_named(path):
-            # One after another: a bomb may have to be decompressed to find the next.
-            for name, size, is_file, fault, open_it in _entries(archive):
-                relative = PureWindowsPath(name)  # knows both separators and drives: nothing absolute escapes it
-                if relative.anchor or ".." in relative.parts:
-                    raise InputError(path, f"member '{name}' would leave the folder it is unpacked into", REMEDY)
-                if fault:
-                    raise InputError(path, f"member '{name}' is {fault}", REMEDY)
-                if (total := total + size) > largest_bytes:
-                    raise InputError(path, f"would unpack to more than {largest_bytes / 1e9:.3g} GB", REMEDY)
-                if is_file:
-                    members.append(Member(path, name, size, open_it))
-        yield members
-
-
-def _entries(archive: zipfile.ZipFile | tarfile.TarFile) -> Iterator[tuple[str, int, bool, str, Any]]:
-    """Yield name, bytes, whether it is a file, the fault of its kind, and what opens each member."""
-    if isinstance(archive, zipfile.ZipFile):
-        for info in archive.infolist():
-            is_fault = stat.S_ISLNK(info.external_attr >> 16) or info.flag_bits & 1
-            fault = "a link or encrypted" if is_fault else ""
-            yield info.filename, info.file_size, not info.is_dir(), fault, partial(archive.open, info)
-        return
-    for member in archive:
-        fault = "" if member.isreg() or member.isdir() else "a link or a device"
-        yield member.name, member.size, member.isreg(), fault, partial(archive.extractfile, member)
-    # tarfile takes a cut between two members, or a damaged header, for the end; a whole tar ends in zeros.
-    stream: Any = archive.fileobj
-    stream.seek(archive.offset)
-    if stream.read(tarfile.BLOCKSIZE) != bytes(tarfile.BLOCKSIZE):
-        raise tarfile.ReadError("no end marker")
-    while rest := stream.read(1 << 20):  # read on to the end, where gzip keeps the checksum of all
-        yield "what follows the members", len(rest), False, "", None
-
-
 def unpack(path: str | Path, folder: str | Path, largest_bytes: int = LARGEST_UNPACKED_BYTES) -> Path:
-    """Unpack an archive into a folder, whole or not at all, unless it is there, and return the folder."""
-    folder = Path(folder)
+    """Unpack an archive into a folder, whole or not at all, unless it is there, and return the folder.
+
+    Nothing leaves the folder; InputError for a damaged archive, or one of too many bytes.
+    """
+    path, folder = Path(path), Path(folder)
     if folder.is_dir():
         return folder
-    with open_archive(path, largest_bytes) as members, whole_folder(folder) as content:
-        needed, free = sum(member.size for member in members), shutil.disk_usage(content).free
-        if needed > free:
-            fault = f"unpacks to {needed / 1e9:.3g} GB, but {free / 1e9:.3g} GB of the disk are free"
-            raise InputError(path, fault, f"free some space or keep downloads outside {folder.parent}")
-        for member in members:
-            target = content / member.name
-            with _damage_named(member.archive):
-                target.parent.mkdir(parents=True, exist_ok=True)
-                with member.open() as stream, target.open("wb") as file:
-                    shutil.copyfileobj(stream, file, 1 << 20)
+    require_file(path, "no such file", "check url or files in the config", math.inf)
+    damaged = refusing(path, "is a truncated or damaged archive, or holds links or devices ({})", REMEDY)
+    with whole_folder(folder) as content, damaged:
+        free = shutil.disk_usage(content).free
+
+        def require_room(sizes: Iterable[int]) -> None:  # one after another: a bomb has to be decompressed for the next
+            total = 0
+            for size in sizes:
+                if (total := total + size) > largest_bytes:
+                    raise InputError(path, f"would unpack to more than {largest_bytes / 1e9:.3g} GB", REMEDY)
+            if total > free:
+                fault = f"unpacks to {total / 1e9:.3g} GB, but {free / 1e9:.3g} GB of the disk are free"
+                raise InputError(path, fault, f"free some space or keep downloads outside {folder.parent}")
+
+        if zipfile.is_zipfile(path):
+            with zipfile.ZipFile(path) as archive:
+                require_room(info.file_size for info in archive.infolist())
+                archive.extractall(content)
+        else:
+            with tarfile.open(path) as members:
+                require_room(member.size for member in members)
+                members.extractall(content, filter="data")
+                # tarfile takes a cut between two members for the end; after it, gzip keeps the checksum of all.
+                stream: Any = members.fileobj
+                stream.seek(members.offset)
+                if stream.read(tarfile.BLOCKSIZE) != bytes(tarfile.BLOCKSIZE):
+                    raise tarfile.ReadError("no end marker")
+                while stream.read(1 << 20):
+                    pass
     return folder
-
-
-@contextmanager
-def _damage_named(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except (*_DAMAGE, *_TWO_IN_ONE_PLACE) as fault:
-        raise InputError(path, f"is a truncated or damaged archive ({fault})", REMEDY) from fault

@@ -1,4 +1,4 @@
-"""Point clouds in files: PCD (0.6, 0.7), NumPy's, text, bin of scanners, and LAS, LAZ, E57 by packages of their own.
+"""Point clouds in files: PCD (0.6, 0.7), NumPy's, text, and bin of scanners.
 
 Rows without a measurement are kept as they are; :func:`gpca.objects.surface.measured` finds them.
 
@@ -6,7 +6,7 @@ PCD: https://pointclouds.org/documentation/tutorials/pcd_file_format.html. Open3
 file or a short row with whatever the memory holds, and reads a double after bytes as 0.
 
 As a kind of source, the UW RGB-D Object Dataset (Lai, Bo, Ren, Fox, ICRA 2011): single views of objects, as PCD
-files or in the dataset's tars, named <class>_<instance>_<sequence>_<frame>; in meters, in the camera's frame.
+files named <class>_<instance>_<sequence>_<frame>; in meters, in the camera's frame.
 """
 
 import io
@@ -15,10 +15,9 @@ import struct
 import warnings
 import zipfile
 from collections.abc import Callable, Iterator
-from contextlib import closing, suppress
-from importlib import import_module
+from contextlib import suppress
 from itertools import groupby
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
 import numpy as np
 
@@ -26,7 +25,6 @@ from gpca.errors import InputError, refusing
 from gpca.io.files import require_file, require_memory
 from gpca.numerals import whole
 from gpca.objects.canonical import require_points
-from gpca.objects.downloads import open_archive
 from gpca.objects.mesh_folder import files_in
 from gpca.objects.mesh_formats import LARGEST_TEXT_BYTES
 from gpca.objects.surface import Surface, evenly, instance_of, meters_per, view_order
@@ -247,68 +245,22 @@ def read_table(path: Path) -> np.ndarray:
     return TABLE_READERS[path.suffix.lower()](path)
 
 
-PACKAGES = {".las": "laspy", ".laz": "laspy", ".e57": "pye57"}
-INSTALL = {"laspy": "pip install 'laspy[lazrs]'", "pye57": "pip install pye57"}
+SUFFIXES, PATTERNS = (".pcd",), ("**/*.pcd",)
 
 
-def read_scanner_file(path: Path) -> np.ndarray:
-    """Return the points (P, 3) float64 of a file of `PACKAGES`, all scans of an E57 file joined in its frame."""
-    require_file(path, "no such file", "give a LAS, LAZ or E57 file")
-    name = PACKAGES[path.suffix.lower()]
-    try:
-        module = import_module(name)
-    except ImportError as fault:
-        raise InputError(path, f"needs the package {name}, which is not installed", INSTALL[name]) from fault
-    try:
-        if name == "laspy":
-            return np.asarray(module.read(path).xyz, np.float64)
-        with closing(module.E57(str(path))) as file:
-            scans = [file.read_scan(number, ignore_missing_fields=True) for number in range(file.scan_count)]
-        clouds = [np.stack([scan[f"cartesian{axis}"] for axis in "XYZ"], axis=1) for scan in scans]
-    except Exception as fault:  # of many kinds, some from C++
-        remedy = INSTALL[name] if "LazBackend" in str(fault) else "export it again, or as PLY"
-        raise InputError(path, f"cannot be read ({fault})", remedy) from fault
-    if not clouds:
-        raise InputError(path, "holds no scan", "export it again, or as PLY")
-    return np.concatenate(clouds).astype(np.float64)
-
-
-SUFFIXES = (".pcd", ".tar", ".tar.gz", ".tgz")
-READS_ARCHIVES = True  # only a few of the 600 views in a tar are read, so nothing is unpacked
-
-
-def require_entry(entry: dict, place: Path) -> None:
+def require_entry(entry: dict, folder: Path) -> None:
     """Raise an InputError unless the files that the entry names are there; reads none."""
-    if entry.get("files") and place.is_dir():
-        files_in(place, entry["files"], SUFFIXES)
+    files_in(folder, entry.get("files") or PATTERNS, SUFFIXES)
 
 
-def from_entry(entry: dict, place: Path) -> Iterator[Surface]:
-    """Yield `views_per_instance` (default 6) views of each instance of a tar, or of the PCD files, spread evenly."""
-    paths = [place] if place.is_file() else files_in(place, entry.get("files"), SUFFIXES)
+def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
+    """Yield `views_per_instance` (default 6) views of each instance in PCD files, spread evenly."""
     scale, most = meters_per(entry.get("unit", "m")), entry.get("views_per_instance", 6)
-    single = [path for path in paths if path.suffix.lower() == ".pcd"]
-    for path in single:
-        require_file(path, "no such file", "check files in the config")
-    yield from _chosen([(path.stem, path.read_bytes, str(path)) for path in single], scale, most)
-    for path in (path for path in paths if path not in single):
-        with open_archive(path) as members:
-            views = [
-                (PurePosixPath(member.name).stem, member.read, f"{path}, member {member.name}")
-                for member in members
-                if member.name.lower().endswith(".pcd")
-            ]
-            if not views:
-                raise InputError(path, "the archive has no .pcd file", "check url or files in the config")
-            yield from _chosen(views, scale, most)
-
-
-def _chosen(views: list[tuple[str, Callable[[], bytes], str]], scale: float, most: int) -> Iterator[Surface]:
-    """Yield some views of each instance: a view is a name, what reads its bytes, and a subject for messages."""
-    views = sorted(views, key=lambda view: view_order(view[0]))
-    for _, group in groupby(views, key=lambda view: instance_of(view[0])):
-        for name, read, subject in evenly(list(group), most):
-            points = parse_pcd(read(), subject)
+    paths = sorted(files_in(folder, entry.get("files") or PATTERNS, SUFFIXES), key=lambda path: view_order(path.stem))
+    for _, group in groupby(paths, key=lambda path: instance_of(path.stem)):
+        for path in evenly(list(group), most):
+            require_file(path, "no such file", "check files in the config")
+            points = parse_pcd(path.read_bytes(), path)
             points = points[~np.isnan(points).any(axis=1)]  # missing depth; infinity is a fault
-            require_points(points, subject)
-            yield Surface(name, points * scale, None)
+            require_points(points, path)
+            yield Surface(path.stem, points * scale, None)

@@ -1,19 +1,15 @@
-"""Readers of legacy VTK (datasets PolyData) and of binary glTF 2.0, without their libraries.
+"""Readers of legacy VTK (datasets PolyData, versions 1 to 5) and, by trimesh, of binary glTF 2.0.
 
-VTK has versions 1 to 5; what follows the geometry is not read. Each mesh of glTF stands where the nodes put it.
+What follows the geometry of VTK is not read. Each mesh of glTF stands where the nodes put it.
 """
 
-import json
 import os
-import struct
-from collections.abc import Callable, Iterator
-from typing import IO, Any
+from collections.abc import Callable
+from typing import IO
 
 import numpy as np
 
-from gpca.io.files import require_memory
 from gpca.objects.mesh_formats import Shape, as_count, as_triangles, bounded_lines, quoted, text_lines
-from gpca.rigid import transform
 
 VTK_KINDS = {
     **{b"float": "f4", b"double": "f8", b"int": "i4", b"unsigned_int": "u4", b"vtktypeint64": "i8", b"vtkidtype": "i4"},
@@ -21,8 +17,6 @@ VTK_KINDS = {
     **{b"long": "i8", b"unsigned_long": "u8"},
 }
 VTK_CELLS = (b"VERTICES", b"LINES", b"POLYGONS", b"TRIANGLE_STRIPS")
-GLTF_KINDS = {5120: "i1", 5121: "u1", 5122: "i2", 5123: "u2", 5125: "u4", 5126: "f4"}
-GLTF_POINTS, GLTF_TRIANGLES, GLTF_STRIPS = 0, 4, (5, 6)  # kinds of primitives; the others are lines
 
 
 class _VTK:
@@ -118,86 +112,15 @@ def _read_vtk(file: IO[bytes]) -> Shape:
 
 
 def _read_glb(file: IO[bytes]) -> Shape:
-    content = file.read()
-    magic, version, size = struct.unpack_from("<4sII", content)
-    if magic != b"glTF" or version != 2:
-        raise ValueError("it is no binary glTF of version 2")
-    if size != len(content):
-        raise ValueError(f"it states {size} bytes, but has {len(content)}")
-    length, _ = struct.unpack_from("<I4s", content, 12)
-    described = json.loads(content[20 : 20 + length])
-    binary = content[28 + length :]
-    packed = [name for name in described.get("extensionsRequired", ()) if "compression" in name]
-    if packed:
-        raise ValueError(f"it is compressed by {packed[0]}; export it without")
+    import trimesh
+
     vertices, faces, count = [np.zeros((0, 3))], [np.zeros((0, 3), np.int64)], 0
-    for T, mesh in _placed(described):
-        for primitive in mesh["primitives"]:
-            mode = primitive.get("mode", GLTF_TRIANGLES)
-            if mode in GLTF_STRIPS:
-                raise ValueError("it has strips or fans of triangles; export it as triangles")
-            if mode not in (GLTF_POINTS, GLTF_TRIANGLES):
-                continue
-            points = _accessed(described, binary, primitive["attributes"]["POSITION"], 3).astype(np.float64)
-            require_memory(24 * (count + len(points)), len(content), file.name, "export it without copies")
-            if mode == GLTF_TRIANGLES:
-                corners = np.arange(len(points))
-                if "indices" in primitive:
-                    corners = _accessed(described, binary, primitive["indices"], 1).astype(np.int64)
-                faces.append(count + corners.reshape(-1, 3))
-            vertices.append(transform(T, points))
-            count += len(points)
+    for part in trimesh.load_scene(file, file_type="glb", process=False).dump():
+        if isinstance(part, trimesh.Trimesh | trimesh.PointCloud):
+            faces.append(count + np.asarray(getattr(part, "faces", faces[0])))
+            vertices.append(np.asarray(part.vertices))
+            count += len(part.vertices)
     return Shape(np.concatenate(vertices), np.concatenate(faces))
-
-
-def _placed(described: dict[str, Any]) -> Iterator[tuple[np.ndarray, dict[str, Any]]]:
-    """Yield the affine map (4, 4) and the mesh of each node of the scene."""
-    nodes = described.get("nodes", [])
-    children = {child for node in nodes for child in node.get("children", ())}
-    roots = [i for i in range(len(nodes)) if i not in children]
-    if scenes := described.get("scenes"):
-        roots = scenes[described.get("scene", 0)].get("nodes", [])
-    if not nodes:
-        yield from ((np.eye(4), mesh) for mesh in described["meshes"])
-    waiting, visited = [(i, np.eye(4)) for i in roots], set()
-    while waiting:
-        i, T = waiting.pop()
-        if i in visited:
-            raise ValueError(f"node {i} stands in two places")
-        visited.add(i)
-        T = T @ _local(nodes[i])
-        if "mesh" in nodes[i]:
-            yield T, described["meshes"][nodes[i]["mesh"]]
-        waiting += [(child, T) for child in nodes[i].get("children", ())]
-
-
-def _local(node: dict[str, Any]) -> np.ndarray:
-    if "matrix" in node:
-        return np.array(node["matrix"], np.float64).reshape(4, 4).T  # column by column
-    from scipy.spatial.transform import Rotation
-
-    T = np.eye(4)
-    T[:3, :3] = Rotation.from_quat(node.get("rotation", (0, 0, 0, 1))).as_matrix() * node.get("scale", (1, 1, 1))
-    T[:3, 3] = node.get("translation", (0, 0, 0))
-    return T
-
-
-def _accessed(described: dict[str, Any], binary: bytes, number: int, width: int) -> np.ndarray:
-    """Return the rows (n, width) of an accessor."""
-    accessor = described["accessors"][number]
-    if "sparse" in accessor or "bufferView" not in accessor:
-        raise ValueError("it has sparse or empty accessors; export it without")
-    view = described["bufferViews"][accessor["bufferView"]]
-    if view["buffer"] or "uri" in described["buffers"][0]:
-        raise ValueError("its data are in another file; export them with it")
-    if (width == 3) != (accessor["type"] == "VEC3") or (width == 3) != (accessor["componentType"] == 5126):
-        raise ValueError(f"accessor {number} is of another type")
-    dtype = np.dtype(f"<{GLTF_KINDS[accessor['componentType']]}")
-    start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
-    stride = view.get("byteStride", width * dtype.itemsize)
-    if start < 0 or stride < width * dtype.itemsize:
-        raise ValueError(f"the rows of accessor {number} overlap, or begin before its data")
-    return np.ndarray((accessor["count"], width), dtype, binary, start, (stride, dtype.itemsize))
 
 
 READERS: dict[str, Callable[[IO[bytes]], Shape]] = {".vtk": _read_vtk, ".glb": _read_glb}

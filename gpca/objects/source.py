@@ -61,14 +61,14 @@ def resolve(entry: dict, data_dir: str | None) -> dict:
     for base in folders_of_data(data_dir) if entry.get("location") or patterns else ():
         if not (folder := require_place(base / location)).exists():
             continue
-        if not (folder.is_dir() or folder.is_file()):
-            raise InputError(folder, "is neither a folder nor a file", "correct location in the config")
+        if not folder.is_dir():
+            raise InputError(folder, "is not a folder", "correct location in the config")
         require_no_root(folder)
         if entry.get("location") or all(any(folder.glob(pattern)) for pattern in patterns):
             require_whole_if_ours(folder)
             if require_entry := getattr(module, "require_entry", None):
                 require_entry(entry, folder)
-            if folder.is_dir() and (idle := [pattern for pattern in patterns if not any(folder.glob(pattern))]):
+            if idle := [pattern for pattern in patterns if not any(folder.glob(pattern))]:
                 raise InputError(f"pattern '{idle[0]}'", f"matches no file in {folder}", "correct files in the config")
             return {**entry, "origin": "local", "location": os.path.abspath(folder)}
     urls, checksums = _as_list(entry.get("urls") or entry.get("url")), _as_list(entry.get("sha256"))
@@ -105,8 +105,7 @@ def surfaces(entry: dict, cache_folder: str | Path) -> Iterator[Surface]:
     if entry["origin"] == PROCEDURAL:
         yield from module.surfaces(entry["family"])
         return
-    archives = getattr(module, "READS_ARCHIVES", False)
-    for folder in folders(entry, cache_folder, unpack=not archives):
+    for folder in folders(entry, cache_folder):
         for surface in module.from_entry(entry, folder):
             _require_surface(surface, f"source '{entry.get('title', entry['kind'])}'")
             yield surface
@@ -126,7 +125,7 @@ def _require_surface(surface: object, subject: str) -> None:
             raise InputError(name, f"has faces of vertices beyond its {len(vertices_m)}", "number them from 0")
 
 
-def folders(entry: dict, cache_folder: str | Path, unpack: bool = True) -> list[Path]:
+def folders(entry: dict, cache_folder: str | Path) -> list[Path]:
     """Return the folders of a resolved entry's data: its location, or one for each download."""
     if entry["origin"] == "local":
         return [Path(entry["location"])]
@@ -135,8 +134,6 @@ def folders(entry: dict, cache_folder: str | Path, unpack: bool = True) -> list[
     checksums = _as_list(entry.get("sha256")) or [None] * len(urls)
     location = entry.get("location")
     files = [downloads.fetch(url, sha256, cache, location) for url, sha256 in zip(urls, checksums, strict=True)]
-    if not unpack:
-        return files
     # Folders are named by content, so that an archive that was fetched again is unpacked again.
     return [downloads.unpack(file, file.with_name(f"{file.stem}-{sha256_of_file(file)[:12]}")) for file in files]
 

@@ -23,7 +23,7 @@ from gpca.tracks.overall import overall
 from gpca.tracks.published import FOLDER as PUBLISHED
 from gpca.tracks.published import NO_CALLS, Method, Published
 from gpca.tracks.scoring import AGAINST, counts, score
-from gpca.tracks.submission import NO_LINK, Submission, read_submission, track_in_head
+from gpca.tracks.submission import NO_LINK, Submission, read_head, read_submission
 from gpca.tracks.track import CAUSES_TRACK, FRAMES_TRACK, HARD_TRACK, SCANS_TRACK, TRACKS
 
 FOLDER = PUBLISHED.parent  # of the submissions
@@ -152,23 +152,23 @@ def as_text(table: Table) -> str:
 
 
 def read_submissions(folder: Path) -> tuple[dict[str, list[Submission]], list[str]]:
-    """Return the submissions of a folder by track, and the faults of all files, a line each."""
+    """Return the submissions of a folder by track, and the first fault of each other file."""
     if not folder.is_dir():
         raise InputError(folder, "no such folder", "name the folder of the submissions")
     submissions: dict[str, list[Submission]] = {}
     published: dict[str, Published] = {}
     faults: list[str] = []
     for path in sorted(folder.glob("*.csv")):
-        track = track_in_head(path)
-        if track not in published:
-            published[track] = Published.load(TRACKS[track])
-        submission, faults_of_file = read_submission(path, published[track])
-        faults += faults_of_file
-        if submission is not None:
-            rivals = submissions.setdefault(track, [])
+        try:
+            track = read_head(path)[0]["track"]
+            if track not in published:
+                published[track] = Published.load(TRACKS[track])
+            submission, rivals = read_submission(path, published[track]), submissions.setdefault(track, [])
             if submission.method.name in [other.method.name for other in rivals]:
-                faults.append(f"{path}: its method has the name of another one; give it a name of its own")
+                raise InputError(path, "its method has the name of another one", "give it a name of its own")
             rivals.append(submission)
+        except InputError as fault:
+            faults.append(str(fault))
     return submissions, faults
 
 

@@ -13,14 +13,14 @@
 """
 
 import csv
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
 
-from gpca.errors import InputError
+from gpca.errors import InputError, refusing, require_known
 from gpca.io.files import is_title, require_file, whole_file
 from gpca.numerals import LARGEST_NUMBER, decimal, whole
 from gpca.tracks.published import NO_CALLS, NOTHING_NAMED, Method, Published
@@ -41,8 +41,6 @@ NO_LINK = "none"
 LINK_REMEDY = f"give an address that begins with https://, or {NO_LINK}"
 NAMED = "named"  # optional column: the predicted label, empty for none; by default that of the largest score
 LARGEST_BYTES = 10**7
-MOST_LINES = 10**5
-MOST_FAULTS = 20  # in the list
 
 
 @dataclass(frozen=True)
@@ -65,145 +63,92 @@ class Submission:
                 writer.writerow([*keys, *(f"{value:.6f}" for value in self.method.scores[row]), named_N[row]])
 
 
-Fault = Callable[[str, str, str], None]  # notes where, what, and the remedy
-
-
-def read_submission(path: Path, published: Published) -> tuple[Submission | None, list[str]]:
-    """Return a submission to a track, or None, and its faults, a line each, no more than `MOST_FAULTS`."""
-    faults: list[str] = []
-
-    def fault(where: str, what: str, remedy: str) -> None:
-        faults.append(f"{path}{', ' if where else ''}{where}: {what}; {remedy}")
-
+def read_head(path: Path) -> tuple[dict[str, str], list[str]]:
+    """Return the entries of a submission's head, with a track among them, and all lines."""
     require_file(path, "no such file", "give a CSV file of predictions", LARGEST_BYTES)
-    try:
+    with refusing(path, "is not a text file in UTF-8", "write it anew"):
         lines = path.read_text("utf-8-sig").splitlines()
-    except UnicodeDecodeError:
-        fault("", "is not a text file in UTF-8", "write it anew")
-        return None, faults
-    if len(lines) > MOST_LINES:
-        fault(
-            "", f"has {len(lines)} lines, more than {MOST_LINES}", "give a row for each test sample, and few comments"
-        )
-        return None, faults
-    length = next((number for number, line in enumerate(lines) if not line.startswith("#")), len(lines))
-    head = _read_head(lines[:length], published, fault)
-    if head.get("track") not in (None, published.track.name):  # its rows say nothing
-        return None, faults
-    try:
-        predictions = _read_rows(lines[length:], length, published, fault)
-    except csv.Error as damage:
-        fault("", f"is not a readable CSV file ({damage})", "write it anew")
-    if len(faults) > MOST_FAULTS:
-        faults = [*faults[:MOST_FAULTS], f"{path}: {len(faults) - MOST_FAULTS} faults more"]
-    if faults or predictions is None:
-        return None, faults
-    calls = int(head["icp_calls"]) if head.get("icp_calls") else NO_CALLS
-    name = f"{head['method']} (submitted)"  # differs from the published ones, and is the same on all tracks
-    return Submission(head, Method(name, head["method"], head.get("reads", ""), calls, *predictions)), faults
-
-
-def _read_head(lines: list[str], published: Published, fault: Fault) -> dict[str, str]:
     head: dict[str, str] = {}
-    for number, line in enumerate(lines, 1):
+    for number, line in enumerate(takewhile(lambda line: line.startswith("#"), lines), 1):
         key, colon, value = (part.strip() for part in line[1:].partition(":"))
         if not colon or key not in {**HEAD, **OPTIONAL}:
             continue  # any other comment
         if key in head:
-            fault(f"line {number}", f"'{key}' stands there twice", "keep one of them")
+            raise InputError(f"{path}, line {number}", f"'{key}' stands there twice", "keep one of them")
         head[key] = value
+    if head.get("track") not in TRACKS:
+        raise InputError(path, "its head names no track", f"add a line '# track: …', one of {', '.join(TRACKS)}")
+    return head, lines
+
+
+def read_submission(path: Path, published: Published) -> Submission:
+    """Return a submission to a track; InputError for its first fault."""
+    head, lines = read_head(path)
+    track, version = published.track.name, published.version
+    if head["track"] != track:
+        raise InputError(path, f"is of the track '{head['track']}', not {track}", "name the track that it is of")
     for key, words in HEAD.items():
         if not is_title(head.get(key, "")):
             what = "has a long or broken" if head.get(key) else "lacks"
-            fault("", f"its head {what} '{key}'", f"add a line '# {key}: …', {words}")
-    track, version = published.track.name, published.version
-    if head.get("track", track) != track:
-        fault("", f"is of the track '{head['track']}', not {track}", "name the track that it is of")
-    elif head.get("version", version) != version:
+            raise InputError(path, f"its head {what} '{key}'", f"add a line '# {key}: …', {words}")
+    if head["version"] != version:
         other = f"is of version '{head['version']}' of the samples, and these are of {version}"
-        fault("", other, "predict these: gpca.load makes them")
-    if not is_link(link := head.get("link", NO_LINK)):
-        fault("", f"'link' is '{link[:40]}'", LINK_REMEDY)
+        raise InputError(path, other, "predict these: gpca.load makes them")
+    if not is_link(head["link"]):
+        raise InputError(path, f"'link' is '{head['link'][:40]}'", LINK_REMEDY)
     for key, read in (("seconds", decimal), ("icp_calls", whole)):
-        text = head.get(key, "")
-        try:
-            if text and read(text) < 0:
+        with refusing(path, f"'{key}' is '{head.get(key, '')[:40]}'", "give a number of 0 or more"):
+            if head.get(key) and read(head[key]) < 0:
                 raise ValueError
-        except ValueError:
-            fault("", f"'{key}' is '{text[:40]}'", "give a number of 0 or more")
-    return head
+    with refusing(path, "is not a readable CSV file ({})", "write it anew"):
+        predictions = _read_rows(path, lines, published)
+    calls = int(head["icp_calls"]) if head.get("icp_calls") else NO_CALLS
+    name = f"{head['method']} (submitted)"  # differs from the published ones, and is the same on all tracks
+    return Submission(head, Method(name, head["method"], head.get("reads", ""), calls, *predictions))
 
 
-def _read_rows(
-    lines: list[str], before: int, published: Published, fault: Fault
-) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return scores and named labels; None if columns are missing, so that no row can be read."""
+def _read_rows(path: Path, lines: list[str], published: Published) -> tuple[np.ndarray, np.ndarray]:
+    """Return scores (N, C) and named labels (N,)."""
     track, rows = published.track, published.rows
     scores = [f"score_{label}" for label in track.labels]
-    table = csv.reader(lines)
-    columns = next(table, [])
-    wanted = [*KEYS, *scores]
-    for name in (name for name in wanted if columns.count(name) != 1):
-        what = f"column '{name}' is {'missing' if name not in columns else 'there twice'}"
-        fault(f"line {before + 1}", what, f"the columns are {', '.join(wanted)} and, if you like, {NAMED}")
-    for name in (name for name in columns if name not in (*wanted, NAMED)):
-        fault(f"line {before + 1}", f"column '{name}' is unknown", "remove it")
-    if any(columns.count(name) != 1 for name in wanted):
-        return None
+    first = next((number for number, line in enumerate(lines) if not line.startswith("#")), len(lines))
+    table = csv.reader(lines[first:])
+    columns, wanted = next(table, []), [*KEYS, *scores]
+    if sorted(columns) not in (sorted(wanted), sorted([*wanted, NAMED])):
+        fault = f"has the columns {', '.join(columns)[:100]}"
+        remedy = f"the columns are {', '.join(wanted)} and, if you like, {NAMED}"
+        raise InputError(f"{path}, line {first + 1}", fault, remedy)
     keys = zip(*(map(str, column.tolist()) for column in (rows.source, rows.seed, rows.sample)), strict=True)
-    row_of_key = {key: row for row, key in enumerate(keys)}
+    row_of_key, sources = {key: row for row, key in enumerate(keys)}, set[str]()
     scores_N_C, named_N = np.full((len(rows), len(scores)), np.nan), np.full(len(rows), NOTHING_NAMED)
-    seen: dict[int, int] = {}
-    for number, cells in enumerate(table, before + 2):
+    for number, cells in enumerate(table, first + 2):
+        line = f"{path}, line {number}"
         if not cells:
             continue
-        line = f"line {number}"
         if len(cells) != len(columns):
-            fault(line, f"has {len(cells)} entries, not {len(columns)}", "give one for each column")
-            continue
-        entry = dict(zip(columns, cells, strict=True))
-        row = row_of_key.get(tuple(entry[name].strip() for name in KEYS))
+            raise InputError(line, f"has {len(cells)} entries, not {len(columns)}", "give one for each column")
+        entry = {name: cell.strip() for name, cell in zip(columns, cells, strict=True)}
+        row = row_of_key.pop(tuple(entry[name] for name in KEYS), None)
         if row is None:
             words = f"source {entry['source']}, seed {entry['seed']}, sample {entry['sample']}"
-            fault(line, f"{words} is no test sample", "give those of gpca.load with split='test'")
-            continue
-        if row in seen:
-            fault(line, f"is of the same sample as line {seen[row]}", "keep one of them")
-        seen[row] = number
-        for column, name in enumerate(scores):
-            try:
-                scores_N_C[row, column] = value = decimal(entry[name].strip())
-                if abs(value) > LARGEST_NUMBER:
-                    raise ValueError
-            except ValueError:
-                words = f"'{name}' is '{entry[name][:40]}', no finite number up to {LARGEST_NUMBER:.0e}"
-                fault(line, words, "give a number")
-        label = entry.get(NAMED, "").strip()
+            fault = f"{words[:100]} is no test sample, or stands there twice"
+            raise InputError(line, fault, "give those of gpca.load with split='test', once each")
+        sources.add(entry["source"])
+        with refusing(line, "{}", "give finite numbers"):
+            scores_N_C[row] = [decimal(entry[name]) for name in scores]
+        if abs(scores_N_C[row]).max() > LARGEST_NUMBER:
+            raise InputError(line, "a score is out of bounds", f"give numbers up to {LARGEST_NUMBER:.0e}")
         if NAMED not in entry:
             named_N[row] = scores_N_C[row].argmax()
-        elif label in track.labels:
-            named_N[row] = track.labels.index(label)
-        elif label:
-            fault(line, f"'{label[:40]}' is no label", f"choose one of {', '.join(track.labels)}")
-    sources = {str(rows.source[row]) for row in seen}
-    needed = {key: row for key, row in row_of_key.items() if key[0] in sources or not track.may_lack(key[0])}
-    if missing := [key for key, row in needed.items() if row not in seen]:
+        elif entry[NAMED]:
+            require_known(f"{line}: label", entry[NAMED][:40], track.labels)
+            named_N[row] = track.labels.index(entry[NAMED])
+    if missing := [key for key in row_of_key if key[0] in sources or not track.may_lack(key[0])]:
         source, seed, sample = missing[0]
-        words = f"{len(missing)} of {len(needed)} test samples are missing, first source {source}, seed {seed}"
-        fault("", f"{words}, sample {sample}", "give every sample once")
+        words = f"{len(missing)} test samples are missing, first source {source}, seed {seed}, sample {sample}"
+        raise InputError(path, words, "give every sample once")
     return scores_N_C, named_N
 
 
 def is_link(text: str) -> bool:
     return text == NO_LINK or text.startswith(("https://", "http://"))
-
-
-def track_in_head(path: Path) -> str:
-    """Return the track that the head of a submission names."""
-    require_file(path, "no such file", "give a CSV file of predictions", LARGEST_BYTES)
-    with path.open(encoding="utf-8-sig", errors="replace") as file:
-        for line in takewhile(lambda line: line.startswith("#"), file):
-            key, _, value = (part.strip() for part in line[1:].partition(":"))
-            if key == "track" and value in TRACKS:
-                return value
-    raise InputError(path, "its head names no track", f"add a line '# track: …', one of {', '.join(TRACKS)}")

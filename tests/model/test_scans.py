@@ -1,9 +1,7 @@
 """Scans explained without a model: a room that was seen from two places."""
 
 import json
-import sys
 from itertools import combinations
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -271,14 +269,12 @@ WRITERS = {
     "csv": lambda path, points: np.savetxt(path, points, delimiter=","),
     "bin": lambda path, points: np.column_stack([points, np.abs(points[:, 0]) / 40]).astype("<f4").tofile(path),
     "ply": lambda path, points: trimesh.PointCloud(points).export(path),
-    "las": lambda path, points: path.write_bytes(b"LASF"),
 }
 
 
 @pytest.mark.parametrize("suffix", WRITERS)
-def test_a_scan_of_80_m_is_read_from_every_format(tmp_path, monkeypatch, suffix):
+def test_a_scan_of_80_m_is_read_from_every_format(tmp_path, suffix):
     WRITERS[suffix](path := tmp_path / f"scan.{suffix}", WIDE)
-    monkeypatch.setitem(sys.modules, "laspy", SimpleNamespace(read=lambda path: SimpleNamespace(xyz=WIDE)))
     np.testing.assert_allclose(read_points(path), WIDE, atol=1e-5)
 
 

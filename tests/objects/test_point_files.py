@@ -1,15 +1,10 @@
 """Points in tables of numbers: NumPy's files, text, and KITTI's."""
 
-import io
-import sys
-import tarfile
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 from gpca.errors import InputError
-from gpca.objects.point_files import from_entry, parse_pcd, read_scanner_file, read_table
+from gpca.objects.point_files import from_entry, parse_pcd, read_table
 
 # The layout of the UW dataset.
 HEADER = """# .PCD v.7 - Point Cloud Data file format
@@ -208,86 +203,23 @@ def test_a_file_that_cannot_be_right_is_one_line(tmp_path, name):
     assert "\n" not in str(caught.value)
 
 
-SCANNER_FILES_POINTS = np.arange(12.0).reshape(4, 3)
-
-
-class E57:
-    """As pye57 0.4 is used: scans by their number, in the frame of the file."""
-
-    scan_count = 2
-
-    def __init__(self, path):
-        assert isinstance(path, str)
-
-    def read_scan(self, number, ignore_missing_fields):
-        assert ignore_missing_fields
-        xyz = SCANNER_FILES_POINTS[2 * number : 2 * number + 2].T
-        return {f"cartesian{axis}": values for axis, values in zip("XYZ", xyz, strict=True)}
-
-    def close(self):
-        pass
-
-
-def las(path):
-    return SimpleNamespace(xyz=SCANNER_FILES_POINTS)
-
-
-def cut(path):
-    raise ValueError("No LazBackend selected, cannot decompress data")
-
-
-@pytest.mark.parametrize(
-    ("name", "package", "module"),
-    [("scan.las", "laspy", SimpleNamespace(read=las)), ("scan.e57", "pye57", SimpleNamespace(E57=E57))],
-)
-def test_points_come_from_the_package_of_the_format(tmp_path, monkeypatch, name, package, module):
-    (tmp_path / name).write_bytes(b"scan")
-    monkeypatch.setitem(sys.modules, package, module)
-    np.testing.assert_array_equal(read_scanner_file(tmp_path / name), SCANNER_FILES_POINTS)
-    monkeypatch.setattr(E57, "scan_count", 0)
-    if package == "pye57":
-        with pytest.raises(InputError, match=r"scan\.e57: holds no scan"):
-            read_scanner_file(tmp_path / name)
-
-
-@pytest.mark.parametrize(("name", "package"), [("scan.laz", "laspy"), ("scan.e57", "pye57")])
-def test_a_missing_package_is_named_with_the_command_that_installs_it(tmp_path, monkeypatch, name, package):
-    (tmp_path / name).write_bytes(b"scan")
-    monkeypatch.setitem(sys.modules, package, None)
-    with pytest.raises(InputError, match=rf"needs the package {package}, which is not installed; pip install"):
-        read_scanner_file(tmp_path / name)
-
-
-def test_what_the_package_cannot_read_is_one_line(tmp_path, monkeypatch):
-    (tmp_path / "scan.laz").write_bytes(b"scan")
-    monkeypatch.setitem(sys.modules, "laspy", SimpleNamespace(read=cut))
-    with pytest.raises(InputError, match=r"cannot be read \(No LazBackend .*; pip install 'laspy\[lazrs\]'"):
-        read_scanner_file(tmp_path / "scan.laz")
-
-
 def view(depth):
     return ascii_pcd([f"0 {i / 100} {depth} 0 0 0" for i in range(3)])
 
 
-def write_tar(path, members, mode="w"):
-    with tarfile.open(path, mode) as archive:
-        for name, content in members.items():
-            info = tarfile.TarInfo(name)
-            info.size = len(content)
-            archive.addfile(info, io.BytesIO(content))
-    return path
-
-
 @pytest.fixture
-def mug_tar(tmp_path):
+def mugs(tmp_path):
     """Instance 1: sequences 1, 2 and 4 of 20 frames each, in the order of names that no number keeps."""
-    names = sorted(f"coffee_mug_1/coffee_mug_1_{sequence}_{frame}" for sequence in (1, 2, 4) for frame in range(1, 21))
-    members = {f"{name}.pcd": view(int(name.split("_")[-1])) for name in names}
-    return write_tar(tmp_path / "coffee_mug_1.tar", {**members, "coffee_mug_1/readme.txt": b"hello"})
+    (folder := tmp_path / "coffee_mug_1").mkdir()
+    for sequence in (1, 2, 4):
+        for frame in range(1, 21):
+            (folder / f"coffee_mug_1_{sequence}_{frame}.pcd").write_bytes(view(frame))
+    (folder / "readme.txt").write_text("hello")
+    return tmp_path
 
 
-def test_views_are_spread_evenly_over_sequences_and_frames(mug_tar):
-    found = list(from_entry({}, mug_tar))
+def test_views_are_spread_evenly_over_sequences_and_frames(mugs):
+    found = list(from_entry({}, mugs))
     assert [surface.name for surface in found] == [
         f"coffee_mug_1_{sequence}_{frame}" for sequence in (1, 2, 4) for frame in (1, 11)
     ]
@@ -295,28 +227,12 @@ def test_views_are_spread_evenly_over_sequences_and_frames(mug_tar):
     assert found[0].faces is None
 
 
-def test_single_files_tars_and_instances_together(tmp_path, mug_tar):
+def test_instances_in_several_folders_are_told_apart(mugs):
     for name in ("apple_1_1_1", "apple_1_1_2", "apple_2_1_1", "loose"):
-        (tmp_path / f"{name}.pcd").write_bytes(view(500))
-    write_tar(tmp_path / "coffee_mug_2.tgz", {"./coffee_mug_2_1_1.pcd": view(700)}, "w:gz")
-    found = list(from_entry({"views_per_instance": 1, "unit": "mm"}, tmp_path))
-    names = ["apple_1_1_1", "apple_2_1_1", "loose", "coffee_mug_1_1_1", "coffee_mug_2_1_1"]
-    assert [surface.name for surface in found] == names
-    assert found[-1].vertices_m[:, 2] == pytest.approx(np.full(3, 0.7))
-    assert len(list(from_entry({"views_per_instance": 1}, mug_tar))) == 1
-
-
-def test_faults_name_the_tar_and_its_member(tmp_path):
-    wrong = write_tar(tmp_path / "wrong.tar", {"a/mug_1_1_1.pcd": view(1).replace(b"FIELDS", b"FEILDS")})
-    with pytest.raises(InputError, match=r"wrong\.tar, member a/mug_1_1_1\.pcd: .*FIELDS"):
-        list(from_entry({}, wrong))
-    with pytest.raises(InputError, match=r"empty\.tar: the archive has no \.pcd"):
-        list(from_entry({}, write_tar(tmp_path / "empty.tar", {"readme.txt": b""})))
-
-
-@pytest.mark.parametrize("kept", [0.1, 0.5, 0.8])
-def test_truncated_tar(mug_tar, kept):
-    content = mug_tar.read_bytes()
-    mug_tar.write_bytes(content[: int(kept * len(content))])
-    with pytest.raises(InputError, match=r"coffee_mug_1\.tar: is a truncated"):
-        list(from_entry({}, mug_tar))
+        (mugs / f"{name}.pcd").write_bytes(view(500))
+    found = list(from_entry({"views_per_instance": 1, "unit": "mm"}, mugs))
+    assert [surface.name for surface in found] == ["apple_1_1_1", "apple_2_1_1", "coffee_mug_1_1_1", "loose"]
+    assert found[-1].vertices_m[:, 2] == pytest.approx(np.full(3, 0.5))
+    (mugs / "loose.pcd").write_bytes(view(1).replace(b"FIELDS", b"FEILDS"))
+    with pytest.raises(InputError, match=r"loose\.pcd: .*FIELDS"):
+        list(from_entry({}, mugs))
