@@ -54,7 +54,7 @@ Elevation = Annotated[float, Bounds(minimum=0, maximum=89)]  # in degrees
 DESCRIPTION = "dataset_info.json"
 WRITTEN = re.compile(
     rf"{DESCRIPTION}|models/(obj_\d{{6}}\.ply|models_info\.json)"
-    r"|test/\d{6}/(scene_(camera|gt|gt_info)\.json|(depth|rgb|mask|mask_visib)/\d{6}(_\d{6})?\.png)"
+    r"|test/\d{6}/(scene_(camera|gt)\.json|(depth|rgb|mask_visib)/\d{6}(_\d{6})?\.png)"
 )
 TABLE_COLOR = (0.72, 0.65, 0.55)
 
@@ -194,52 +194,32 @@ def _write_scene(folder: Path, surfaces, standing: list[Placed], views, settings
     placed = [(p.T_world_object, surfaces[p.model]) for p in standing]
     meshes = [(transform(T_world_object, surface.vertices_m), surface.triangles) for T_world_object, surface in placed]
     scene = MeshScene([*meshes, table()])
-    alone = [MeshScene([mesh]) for mesh in meshes]
     colors_M_3 = np.array([*(model_color(p.model, len(surfaces)) for p in standing), TABLE_COLOR])
-    for name in ("depth", "rgb", "mask", "mask_visib"):
+    for name in ("depth", "rgb", "mask_visib"):
         (folder / name).mkdir(parents=True)
     camera_json: dict[int, dict] = {}
     truth_json: dict[int, list[dict]] = {}
-    info_json: dict[int, list[dict]] = {}
     for image, T_world_camera in enumerate(views):
         view = scene.look(settings.camera, T_world_camera)
         depth_m = settings.noise.measure(view, generator(*axes, "depth", image))
         depth_units = np.rint(1e3 * depth_m / DEPTH_SCALE).clip(0, 65535).astype(np.uint16)
         Image.fromarray(depth_units).save(folder / f"depth/{image:06d}.png")
         Image.fromarray(shade(view, colors_M_3, T_world_camera)).save(folder / f"rgb/{image:06d}.png")
-        truth_json[image], info_json[image] = [], []
+        truth_json[image] = []
         for n, object_ in enumerate(standing):
-            whole, visible = alone[n].silhouette(settings.camera, T_world_camera), view.mesh == n
-            for kind, mask in (("mask", whole), ("mask_visib", visible)):
-                Image.fromarray(np.where(mask, 255, 0).astype(np.uint8)).save(
-                    folder / f"{kind}/{image:06d}_{n:06d}.png"
-                )
+            mask = np.where(view.mesh == n, 255, 0).astype(np.uint8)
+            Image.fromarray(mask).save(folder / f"mask_visib/{image:06d}_{n:06d}.png")
             T_camera_object = inverse(T_world_camera) @ object_.T_world_object
             truth_json[image].append({"obj_id": object_.model + 1, **_pose(T_camera_object, "m2c")})
-            info_json[image].append(
-                {
-                    "px_count_all": int(whole.sum()),
-                    "px_count_valid": int((whole & (depth_m > 0)).sum()),
-                    "px_count_visib": int(visible.sum()),
-                    "visib_fract": float(visible.sum() / max(1, whole.sum())),
-                    "bbox_obj": _box(whole),
-                    "bbox_visib": _box(visible),
-                }
-            )
         camera_json[image] = {"cam_K": settings.camera.matrix_3_3.ravel().tolist(), "depth_scale": DEPTH_SCALE}
         camera_json[image] |= _pose(inverse(T_world_camera), "w2c")
-    for name, content in (("camera", camera_json), ("gt", truth_json), ("gt_info", info_json)):
+    for name, content in (("camera", camera_json), ("gt", truth_json)):
         _write_json(folder / f"scene_{name}.json", content)
 
 
 def _pose(T: np.ndarray, frames: str) -> dict[str, list[float]]:
     rotation, translation_mm = T[:3, :3].ravel().tolist(), (1e3 * T[:3, 3]).tolist()
     return {f"cam_R_{frames}": rotation, f"cam_t_{frames}": translation_mm}
-
-
-def _box(mask: np.ndarray) -> list[int]:
-    v, u = np.nonzero(mask)
-    return [int(u.min()), int(v.min()), int(np.ptp(u)) + 1, int(np.ptp(v)) + 1] if len(u) else [-1, -1, -1, -1]
 
 
 def model_color(model: int, count: int) -> tuple[float, float, float]:

@@ -57,7 +57,7 @@ IMAGES = {
     "mask a bomb": (MASK, bomb(13_500, "L"), "too many for a frame"),
     "mask of text": (MASK, lambda p: p.write_text("255"), "is truncated or not a readable image"),
     "mask a picture": (MASK, lambda p: save(p, COLOURS), "is not a mask: most of its pixel values differ"),
-    "mask everywhere": (MASK, lambda p: save(p, np.full(SHAPE, 255, np.uint8)), "lie", "check its pose, mask"),
+    "mask everywhere": (MASK, lambda p: save(p, np.full(SHAPE, 255, np.uint8)), "lie", "masks"),
 }  # fmt: skip
 
 
