@@ -144,17 +144,6 @@ def anchor_of(points: int, settings: ReenactmentSettings) -> Anchor:
     return Anchor(rotation_rad, settings.good_translation / np.sqrt(3), max(points / INDEPENDENT, 1.0))
 
 
-def hypothesis_at(
-    T: np.ndarray,
-    observed: np.ndarray,
-    surface: ModelSurface,
-    settings: ReenactmentSettings,
-    random: np.random.Generator,
-) -> Hypothesis:
-    """Return a pose, as in :func:`find_hypotheses`, with the width and the outliers that are most likely there."""
-    return _hypothesis(fits_at(T[None], observed, surface), 0, observed, surface, settings, random, None)
-
-
 def fits_at(T_n: np.ndarray, observed: np.ndarray, surface: ModelSurface) -> Fits:
     """Return what the mixture says of poses (n, 4, 4) that stay: only widths and shares of outliers are estimated."""
     mixture, densities = Mixture(surface.points, surface.spacing / 2), densities_of(observed, surface.points)

@@ -1,11 +1,9 @@
 """Settings of the re-enactment (docs/causes.md); nothing here needs the code that it runs."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
 from gpca.causes.settings import Angle
-from gpca.causes.truth import ALL, BY_SIZE, SUBSETS
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.settings import Bounds, OpenShare, Positive, Share
 
@@ -28,11 +26,3 @@ class ReenactmentSettings:
     def calls(self, starts: int) -> int:
         """Return how many runs of ICP take whole clouds, at most: of all subsets of the causes from so many starts."""
         return self.hypotheses * 2 ** len(CONCEPTS) * starts
-
-
-NOTHING, EVERYTHING = "nothing", "everything"
-# What a re-enactment may know -> the causes about which it knows the truth; the fewest first.
-KNOWN: Mapping[str, tuple[int, ...]] = {
-    EVERYTHING if subset == ALL else "_".join(CONCEPTS[cause] for cause in SUBSETS[subset]) or NOTHING: SUBSETS[subset]
-    for subset in BY_SIZE
-}

@@ -7,7 +7,7 @@ from time import perf_counter
 from typing import Any
 
 from gpca.alignment.icp import ICPSettings
-from gpca.attribution.predictions import read_timings, write_predictions, write_timings
+from gpca.attribution.predictions import read_timings, write_timings
 from gpca.causes.dataset import LABELS, Causes, with_label
 from gpca.causes.settings import CauseSettings, DescriptorSettings
 from gpca.encoders.registry import EncoderSettings
@@ -62,21 +62,6 @@ def _measure(job: Job, out: Path, measure: Callable[..., tuple], *settings: Any)
         measured, own_S, own_icp_S = measure(causes, job.source, job.seed, *settings)
         measured.save(out)
         write_timings(job.timings, causes.registrations, seconds_S + own_S, icp_seconds_S + own_icp_S)
-
-
-def oracles(job: Job) -> None:
-    """Diagnose test samples by re-enactments that know parts of the truth -> ``oracles/{source}/{known}/seed….csv``."""
-    from gpca.reenactment.oracle import ask_oracles
-
-    settings = read_settings(ReenactmentSettings, job.section("reenactment"))
-    truth = CauseSettings.from_dict(job.section("causes"), job.section("icp"))
-    paths = {path.parts[-2]: path for path in job.predictions}
-    with record_provenance(job.predictions, [job.objects, job.causes], job.settings, seed=job.seed):
-        objects = ObjectClouds.load(job.objects, job.source)
-        causes = Causes.load(job.causes, (job.source, job.seed))
-        tested = causes.subset(causes.rows("test"))
-        for name, attribution in ask_oracles(objects, tested, job.source, job.seed, settings, truth).items():
-            write_predictions(paths[name], tested.registrations, attribution)
 
 
 def train_on_causes(job: Job) -> None:

@@ -104,7 +104,7 @@ def test_virtual_frames_stay_while_a_dataset_does():
         ("estimators.gauss", "estimators: no estimator 'gauss'; choose one of bonnabel, "),
         ("methods.icp", "methods: no registration method 'icp'; choose one of point_to_point, "),
         ("encoders.dgcnn", "embedding.encoder: encoder 'dgcnn' is left out; choose one of pointnet, "),
-        ("sources.ycb", "oracles.sources: source 'ycb' is left out; choose one of coffee_cup, linemod"),
+        ("sources.ycb", "exchange.sources: source 'ycb' is left out; choose one of coffee_cup, linemod"),
         ("sources.coffee_cup", "figures.source: source 'coffee_cup' is left out; choose one of linemod, ycb"),
         ("recovery.actions.denoise", "recovery.treatments.noise: action 'denoise' is left out; choose one of reinit"),
         ("uncertainty.causal", "uncertainty.causal: is missing; add it"),

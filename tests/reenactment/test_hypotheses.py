@@ -9,7 +9,6 @@ from gpca.reenactment.hypotheses import (
     distinct_rows,
     find_hypotheses,
     first_of_alike,
-    hypothesis_at,
     log_prior,
     rotations,
     search_starts,
@@ -130,13 +129,3 @@ def test_of_poses_that_are_alike_the_first_counts():
     offsets = np.array([0, 1e-4, 0.1, 0.1001, 2e-4])
     poses = exp(offsets[:, None] * np.array([[1.0, 0, 0, 0, 0, 0]]))
     assert first_of_alike(poses).tolist() == [True, False, True, False, False]
-
-
-def test_a_pose_that_is_given_stays_and_is_likelier_where_it_is_true(drill):
-    candidate = candidate_of(drill, "noise", "pose", "overlap", seed=102)
-    pair, T_true = pair_of(candidate)
-    surface, before = ModelSurface(candidate.model), transform(pair.T_init, pair.observed)
-    true, wrong = (hypothesis_at(T, before, surface, SETTINGS, np.random.default_rng(0)) for T in (T_true, np.eye(4)))
-    assert np.array_equal(true.T, T_true)
-    assert true.log_posterior > wrong.log_posterior + 4.5
-    assert true.width == pytest.approx(0.06, rel=0.3)

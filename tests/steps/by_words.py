@@ -14,7 +14,7 @@ from gpca.process.processor import THREAD_VARIABLES
 
 STEPS = {  # module of gpca.steps -> the steps that it has, functions of their names; or name=function
     "active_learning": "active_learning=learn_actively without=embed_without",
-    "causes": "causes describe reenact train_on_causes model oracles",
+    "causes": "causes describe reenact train_on_causes model",
     "control_samples": "train_control=train",
     "controls": "controls=explain",
     "diagnosis": "diagnose diagnose_by_features diagnose_frames",
@@ -53,7 +53,6 @@ LISTS = {  # which names of a step are lists, and not of one seed, file or name
     "frame_labels": "backbones embeddings strategies out",
     "kernel_grid": "seeds registrations embeddings out predictions",
     "learning_curve": "causes descriptors samples",
-    "oracles": "predictions",
     "shift": "seeds registrations other_registrations embeddings encoders out",
     "learners": "seeds learners sets out",
     "register_methods": "seeds methods registrations rows timings",

@@ -2,8 +2,6 @@
 
 import json
 
-from gpca.reenactment.settings import KNOWN
-
 FEW = {"iterations": 5, "inducing": 6, "draws": 20}  # of a classifier
 ENCODER = {"draw_points": 64, "draws": 2, "epochs": 2, "batch_size": 12, "options": {"k": 8, "point_features": 16}}
 POLICY = {
@@ -54,10 +52,6 @@ STEP_OPTIONS = {
     "reenact": COMMON | {
         "--settings": REENACTED, "--seed": 0, "--causes": "causes.npz", "--causes-timings": "causes_timings.csv",
         "--reenactments": "reenactments.npz", "--timings": "reenactments_seconds.csv",
-    },
-    "oracles": COMMON | {
-        "--settings": REENACTED, "--seed": 0, "--objects": "objects.npz", "--causes": "causes.npz",
-        "--predictions": [f"oracles/{name}/seed0.csv" for name in KNOWN],
     },
     "estimate": COMMON | {
         "--settings": {

@@ -79,11 +79,6 @@ FAULTS = {
         (truncated("scans.npz"), {}, f"scans.npz: {NO_ARCHIVE}"),
         (arrays_changed("scans.npz", offsets=later), {}, "scans.npz: 'offsets' do not match 'points'"),
     ],
-    "oracles": [
-        (removed("objects.npz"), {}, "objects.npz: no such file"),
-        (arrays_changed("objects.npz", points_m=upside_down), {}, "sample 0 of tiny, seed 0: is not reproduced"),
-        (arrays_changed("causes.npz", candidate=later), {}, "sample 0 of tiny, seed 0: is not reproduced by"),
-    ],
     "estimate": [
         (removed("causes.npz"), {}, "causes.npz: no such file"),
         (arrays_changed("objects.npz", names=reversed_order), {}, ANOTHER_NAME),

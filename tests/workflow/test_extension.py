@@ -64,7 +64,7 @@ def test_a_folder_of_meshes_and_a_rule_of_an_own_source_become_rows(finished, pl
     table2 = "results/smoke/tables/table2_per_concept"
     new_alone = ("seeds=[0]", "sources={coffee_cup: false, ycb: false, torus: false}",
                  "figures={source: my_parts}", "kernel_grid={sources: [my_parts]}",
-                 "cause_shifts={sources: [my_parts]}", "oracles={sources: [my_parts]}",
+                 "cause_shifts={sources: [my_parts]}",
                  "exchange={sources: [my_parts]}", "recovery={objects: my_parts}")  # fmt: skip
     finished.snakemake("-j2", f"{table2}.md", *SMOKE, *data_dir, *new_alone)
     finished.snakemake("-j1", "results/smoke/objects/torus.npz", *SMOKE, *data_dir)
