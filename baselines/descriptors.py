@@ -1,8 +1,7 @@
 """Explainers of causes on the descriptors of a pair (:mod:`gpca.causes.descriptors`) or on its re-enactment.
 
 ``pair_forest`` reads 52 distances, ICP's motion, fitness and spread; ``pair_boosting`` reads every descriptor.
-``gpca_pair`` is GP-CA's multi-class classifier. ``gpca_multilabel`` has a Gaussian process for failure and one for each
-cause, so that several causes may have high scores. ``pair_committee`` averages a forest, boosting and GP-CA. Names that
+``gpca_pair`` is GP-CA's multi-class classifier. ``pair_committee`` averages a forest, boosting and GP-CA. Names that
 end in ``_clouds`` see the two clouds after ICP alone. ``trees_on_*`` and ``gpca_on_*`` measure what each part is worth,
 in the order of cost; runs from other starts and remedies without restarts cost the same with the default settings.
 
@@ -24,9 +23,9 @@ from gpca.causes.descriptors import EVERY, EVERYTHING, RESIDUALS, Columns, seen
 from gpca.causes.settings import DENSITIES
 from gpca.causes.training import QUICK
 from gpca.causes.truth import NOMINAL
-from gpca.classifier.settings import GPCArguments, GPCSettings, LearningRate
+from gpca.classifier.settings import GPCArguments, LearningRate
 from gpca.explainers import interface
-from gpca.explainers.classifiers import boosted_trees, known_concepts, standardized_regression
+from gpca.explainers.classifiers import boosted_trees, standardized_regression
 from gpca.explainers.gpca import DescriptorGPCA
 from gpca.explainers.interface import ExplainerEntry, Sees, attached
 from gpca.model.result import DEFAULT_TOLERANCE, Evidence, ResultJudge
@@ -112,28 +111,6 @@ class QuickGPCA(CausePairGPCA):
     """The same on quick descriptors alone, which further samples have."""
 
     wanted = dict.fromkeys(QUICK, EVERY)
-
-
-class MultiLabelGPCA(interface.ScoringExplainer):
-    """Binary GPs for failure and for each cause; a cause's score is its probability times that of a failure."""
-
-    labels = LABELS
-
-    def __init__(self, sees: Sees, source: str, seed: int, **settings: GPCArguments) -> None:
-        from gpca.explainers.pair_classifier import PairClassifier
-
-        self._sees = sees
-        self._classifier = PairClassifier(GPCSettings(**settings), source, seed, "causes")
-
-    def fit(self, registrations: Registrations) -> None:
-        """Fit the four classifiers to the labels and the sets of causes, which are attached as ``causes``."""
-        known_concepts(registrations.concept, LABELS)
-        causes_N_3 = attached(registrations, "causes") > 0.5
-        self._classifier.fit(described(registrations, self._sees), registrations.concept != NOMINAL, causes_N_3)
-
-    def scores(self, registrations: Registrations) -> np.ndarray:
-        judged = self._classifier.judge(self._classifier.normalized(described(registrations, self._sees)))
-        return np.column_stack([1 - judged.failure_N, judged.failure_N[:, None] * judged.causes_N_3])
 
 
 class Committee(interface.ScoringExplainer):
@@ -257,10 +234,6 @@ _density = partial(regression, {"planes": DENSITIES})
 _distances = partial(forest, {"distances": EVERY, "motion": EVERY})
 
 
-def _own(title: str, make: Callable[..., interface.ConceptExplainer]) -> ExplainerEntry:
-    return replace(entry(title, make, ALL if make is Committee else WITH_RUNS), alone=True)
-
-
 def _further(title: str, make: Callable[..., interface.ConceptExplainer]) -> ExplainerEntry:
     return replace(entry(title, make, WITH_RUNS), further=True)
 
@@ -285,10 +258,6 @@ CAUSE_EXPLAINERS = {
     "pair_boosting_clouds": entry(f"Descriptors (boosting), {WITHOUT}", boosting, CLOUDS),
     "gpca_pair": entry("GP-CA on the pair", CausePairGPCA, ALL),
     "gpca_pair_clouds": entry(f"GP-CA on the pair, {WITHOUT}", CausePairGPCA, CLOUDS),
-    "gpca_multilabel": entry("GP-CA on the pair, multi-label", MultiLabelGPCA, ALL),
-    "gpca_multilabel_clouds": entry(f"GP-CA on the pair, multi-label, {WITHOUT}", MultiLabelGPCA, CLOUDS),
-    "pair_forest_own": _own("Distances of the pair (forest), own source alone", _distances),
-    "pair_committee_own": _own("Committee on the pair, own source alone", Committee),
     "gpca_further": _further("GP-CA on the pair, further samples", QuickGPCA),
     "committee_further": _further("Committee on the pair, further samples", QuickCommittee),
     "pair_committee": entry("Committee on the pair", Committee, ALL),

@@ -28,10 +28,10 @@ def forest(source: str, seed: int, trees: Count = 50) -> Learner:
 
 
 class ProbableSVM(Learner):
-    """A support vector machine with scikit-learn's defaults, and Platt's sigmoids over up to five folds."""
+    """A linear support vector machine with scikit-learn's defaults, and Platt's sigmoids over up to five folds."""
 
-    def __init__(self, kernel: str, source: str, seed: int) -> None:
-        self._kernel = kernel
+    def __init__(self, source: str, seed: int) -> None:
+        pass  # the classifier needs to know the samples
 
     def fit(self, registrations: Registrations) -> None:
         from sklearn.calibration import CalibratedClassifierCV
@@ -40,7 +40,7 @@ class ProbableSVM(Learner):
         folds = min(5, *np.unique(registrations.concept, return_counts=True)[1])
         if folds < 2:
             raise InputError("training registrations", "have a single sample of a concept", "give at least two")
-        svm = SVC(kernel=self._kernel, random_state=PAPERS_RANDOM_STATE)
+        svm = SVC(kernel="linear", random_state=PAPERS_RANDOM_STATE)
         self._classifier = ConceptClassifier(_standardized(CalibratedClassifierCV(svm, cv=folds, ensemble=False)))
         super().fit(registrations)
 
@@ -65,26 +65,6 @@ def logistic(source: str, seed: int, inverse_regularisation: Positive = 1.0) -> 
     return Learner(standardized_regression(inverse_regularisation))
 
 
-def laplace_gpc(source: str, seed: int, lengthscale: Positive = 1.0) -> Learner:
-    """Make scikit-learn's GP classifier: one against the rest, Laplace's approximation, RBF kernel.
-
-    The lengthscale is in units of √(2 d), the expected distance of two standardized embeddings; scikit-learn would take
-    minutes to find it.
-    """
-    from sklearn.gaussian_process import GaussianProcessClassifier
-    from sklearn.gaussian_process.kernels import RBF, ConstantKernel
-    from sklearn.preprocessing import FunctionTransformer
-
-    kernel = ConstantKernel(10.0) * RBF(lengthscale)
-    return Learner(
-        _standardized(FunctionTransformer(_to_unit_distance), GaussianProcessClassifier(kernel, optimizer=None))
-    )
-
-
-def _to_unit_distance(features_N_F):
-    return features_N_F / (2 * features_N_F.shape[1]) ** 0.5
-
-
 def _standardized(*steps):
     from sklearn.pipeline import make_pipeline
     from sklearn.preprocessing import StandardScaler
@@ -95,9 +75,7 @@ def _standardized(*steps):
 _entry = partial(ExplainerEntry, sees=("source",), reads="embeddings")
 EXPLAINERS = {
     "learner_forest": _entry("Random forest on the embedding", forest),
-    "learner_linear_svm": _entry("Linear SVM on the embedding", partial(ProbableSVM, "linear")),
-    "learner_rbf_svm": _entry("RBF SVM on the embedding", partial(ProbableSVM, "rbf")),
+    "learner_linear_svm": _entry("Linear SVM on the embedding", ProbableSVM),
     "learner_logistic": _entry("Logistic regression on the embedding", logistic),
     "learner_nearest": _entry("k nearest embeddings", Nearest),
-    "learner_laplace_gpc": _entry("Laplace GPC on the embedding", laplace_gpc),
 }

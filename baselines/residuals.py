@@ -5,7 +5,6 @@ pose both, and the spread of the Monte-Carlo poses of ICP. Like GP-CA, the class
 """
 
 from functools import partial
-from typing import Annotated
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from gpca.explainers.classifiers import standardized_regression
 from gpca.explainers.interface import ClassifierExplainer, ExplainerEntry, attached, measured
 from gpca.pairs.dataset import Registrations
 from gpca.seeds import seed_of
-from gpca.settings import Bounds, Count, Positive
+from gpca.settings import Count, Positive
 
 FLOOR = 1e-6  # variance, as that of the uncertainty itself: a thousandth of a radian or of the diameter, squared
 OBSERVED = 0  # the condition of the uncertainty design that leaves the observed pair as it is
@@ -68,27 +67,8 @@ def residuals_forest(source: str, seed: int, trees: Count = 200, floor: Positive
     return Residuals(RandomForestClassifier(n_estimators=trees, random_state=random_state), floor)
 
 
-def residuals_rules(
-    source: str,
-    seed: int,
-    depth: Annotated[int, Bounds(minimum=1, maximum=20)] = 3,
-    smallest_leaf: Annotated[float, Bounds(exclusiveMinimum=0, maximum=0.5)] = 0.02,
-    floor: Positive = FLOOR,
-) -> Residuals:
-    """Make a shallow decision tree (CART, Breiman et al. 1984): rules that a person could write (paper, Sec. II).
-
-    An answer comes after at most `depth` questions; `smallest_leaf` is the minimum share of training samples behind it.
-    """
-    from sklearn.tree import DecisionTreeClassifier
-
-    random_state = seed_of(source, seed, "residual_rules") % 2**32
-    tree = DecisionTreeClassifier(max_depth=depth, min_samples_leaf=smallest_leaf, random_state=random_state)
-    return Residuals(tree, floor)
-
-
 _entry = partial(ExplainerEntry, sees=("pair", "runs"), reads="uncertainty/removal", observed_only=True)
 EXPLAINERS = {
     "residuals_logistic": _entry("Residuals (logistic regression)", residuals_logistic),
     "residuals_forest": _entry("Residuals (random forest)", residuals_forest),
-    "residuals_rules": _entry("Residuals (rules)", residuals_rules),
 }

@@ -95,7 +95,7 @@ def _folder_read(wildcards: Wildcards) -> str:
 def _of_all(wildcards: Wildcards, folder: str) -> str | list[str]:
     """Files of all sources; none for an explainer of one source, or of embeddings by an encoder of one source."""
     entry = explainer_entry(wildcards.cause_explainer, CAUSES)
-    return [] if entry.alone or entry.reads == EMBEDDINGS else f"{folder}/{{*source}}/seed{{*seed}}.npz"
+    return [] if entry.reads == EMBEDDINGS else f"{folder}/{{*source}}/seed{{*seed}}.npz"
 
 
 FURTHER = "learning_samples/{*source}/chunk{*chunk}.npz"

@@ -186,7 +186,6 @@ class ExplainerEntry:
         False  # whether it knows the truth about what it explains: an upper bound, which its title has to say
     )
     observed_only: bool = False  # of a design's outcomes it reads the first alone, that of the observed pair
-    alone: bool = False  # whether it learns from the source that it is asked about, not from all
     further: bool = False  # whether it learns from further samples too, which have quick descriptors alone
 
     def __post_init__(self) -> None:

@@ -152,7 +152,7 @@ def _causes(trial: MethodTrial, source: str, seed: int) -> PartPredictions:
     others = [
         (samples.files([f"causes/{each}/seed{seed}.npz"])[0], read_of(each))
         for each in dict.fromkeys(part for part, _, _ in samples.parts())
-        if each != source and not entry.alone and entry.reads != EMBEDDINGS
+        if each != source and entry.reads != EMBEDDINGS
     ]
     learned = others, _further(samples) if entry.further else []
     attribution = explained(entry, trial.settings, causes, path, read_of(source), descriptors, reenactment, *learned)

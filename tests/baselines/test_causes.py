@@ -17,7 +17,7 @@ from gpca.reenactment.dataset import FEATURES
 
 GPC = {"learning_rate": 0.1, "iterations": 60, "inducing": 8, "draws": 50}
 FAST = {
-    **dict.fromkeys(("gpca", "gpca_pair", "gpca_multilabel", "gpca_further"), GPC),
+    **dict.fromkeys(("gpca", "gpca_pair", "gpca_further"), GPC),
     "gpca_pair_dgcnn": {"iterations": 20, "inducing": 8, "draws": 50, "points": 32, "draw_points": 16, "epochs": 1},
     "pair_forest": {"trees": 10},
     "pair_boosting": {"iterations": 3},
@@ -26,7 +26,7 @@ FAST |= {name: FAST["gpca"] for name in explainers(CAUSES) if name.startswith("g
 FAST |= {name: FAST["pair_forest"] for name in explainers(CAUSES) if name.startswith("trees_on_")}
 FAST |= {f"{name}_clouds": settings for name, settings in FAST.items()}
 # Each is made of three of the others, and slow.
-COMMITTEES = {"committee_further", "pair_committee_own", "pair_committee", "pair_committee_clouds", "reenact_committee"}
+COMMITTEES = {"committee_further", "pair_committee", "pair_committee_clouds", "reenact_committee"}
 NAMES = sorted(set(explainers(CAUSES)) - COMMITTEES)
 
 
@@ -101,16 +101,9 @@ def test_one_label_is_nothing_to_learn_but_for_an_alarm(seen):
     explainer.fit(seen.subset(np.flatnonzero(seen.concept != NOMINAL)))
     assert (explainer.explain(seen).scores_N_C[:, 0] == 0).all()
     alike = seen.subset(np.flatnonzero(seen.concept == NOMINAL))
-    for name in ("gpca_multilabel", "pair_forest", "concept_vectors"):
+    for name in ("pair_forest", "concept_vectors"):
         with pytest.raises(InputError, match="fewer than two"):
             explained(name, alike)
-
-
-def test_several_causes_may_have_high_scores_at_once(seen):
-    both = replace(seen, attached={**seen.attached, "causes": np.ones((len(seen), 3))})
-    scores = explained("gpca_multilabel", both).scores_N_C
-    failed = scores[:, 0] < 0.5
-    assert (scores[failed, 1:].sum(axis=1) > 1).any()
 
 
 def test_the_threshold_of_nominal_is_the_best_and_holds_for_the_scores():

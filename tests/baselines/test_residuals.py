@@ -11,7 +11,7 @@ from gpca.pairs.dataset import ragged
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.uncertainty.spread import SMALLEST_RESIDUAL, log_residual
 
-RIVALS = ("residuals_logistic", "residuals_forest", "residuals_rules")
+RIVALS = ("residuals_logistic", "residuals_forest")
 
 
 @pytest.fixture(scope="module")
@@ -90,9 +90,7 @@ def test_a_seed_repeats_every_byte_and_a_concept_absent_from_training_scores_0(n
 def test_the_config_may_set_what_they_take():
     require_settings("residuals_logistic", {"inverse_regularisation": 0.1, "floor": 1e-5})
     require_settings("residuals_forest", {"trees": 20, "floor": 1e-5})
-    require_settings("residuals_rules", {"depth": 2, "smallest_leaf": 0.1, "floor": 1e-5})
     with pytest.raises(InputError, match="setting floor"):
         require_settings("residuals_forest", {"floor": 0})
-    for wrong in ({"depth": 0}, {"smallest_leaf": 0.6}, {"smallest_leaf": 0}, {"leaves": 3}):
-        with pytest.raises(InputError, match="setting"):
-            require_settings("residuals_rules", wrong)
+    with pytest.raises(InputError, match="setting"):
+        require_settings("residuals_forest", {"leaves": 3})

@@ -15,7 +15,7 @@ def test_rows_that_a_config_adds_stand_where_the_defaults_have_them():
     given = merged(own, *map(read_file, DEFAULTS), own)  # as Snakemake does it, with the given keys first
     lower = with_defaults()
     usual = list(lower["controls"]["explainers"])
-    assert next(iter(given["controls"]["explainers"])) == "residuals_rules"
+    assert next(iter(given["controls"]["explainers"])) == "gpca_pair_dgcnn"
     found = in_order(given)
     assert found == given
     assert list(found) == list(lower)

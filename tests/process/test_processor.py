@@ -45,8 +45,6 @@ LEARNERS = {
     "learner_ensemble": {"members": 2, "steps": 10},
     "learner_forest": {},
     "learner_laplace_head": {"draws": 50, "steps": 10, "hidden": 8},
-    "learner_laplace_gpc": {},
-    "learner_rbf_svm": {},
 }
 PREPARED = "from gpca.process.processor import prepare; prepare(); import json, sys; "
 CHAIN = (
