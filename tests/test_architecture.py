@@ -30,7 +30,7 @@ def code(cell):
     return re.findall(r"`([^`]+)`", cell)
 
 
-ROOMS = [code(folder)[0] for folder, _ in rows("Rooms")]
+ROOMS = [code(folder)[0] for folder, _ in rows("Layers")]
 
 
 def room_of(module):
