@@ -22,7 +22,7 @@ from gpca.reporting.tables.builder import interval_over
 from gpca.reporting.tables.cells import cell_of_repeats
 from gpca.reporting.tables.table import Cell
 from gpca.settings import Distinct
-from gpca.steps.kernel_grid import BY_GPYTORCH, GRID_COLUMNS, MEASURES, PRINTED, SETTING, KernelGrid
+from gpca.steps.kernel_grid import GRID_COLUMNS, MEASURES, PRINTED, SETTING, KernelGrid
 
 TABLE = "kernels"  # in the column `table`
 GRID_FILES = "kernels/{kernel_source}/seed{seed}.csv"
@@ -105,8 +105,6 @@ def collect_intervals(run: Run, files: Paths) -> Frame:
 
 SECTION = "IV-D Ablation studies"
 TITLES = {"rbf": "RBF", "matern32": "Matérn 3/2", "polynomial": "Polynomial, p = 2"}
-TITLES |= {kernel + BY_GPYTORCH: f"{title}, by gpytorch" for kernel, title in TITLES.items()}
-GPYTORCH_NOTE = "By gpytorch: the same fit in gpytorch's own classes, from the same start and random numbers."
 HEADS = {"kernel": "Kernel", "learning_rate": "Rate", "iterations": "Iterations"}
 COLUMNS = {
     "accuracy": show("accuracy", "Accuracy (%)"),
@@ -127,13 +125,12 @@ COLUMNS = {
     intervals="kernel_intervals.csv",
 )
 def table4_kernels(run: Run, intervals):
-    again = [(kernel + BY_GPYTORCH, rate, iterations) for kernel, rate, iterations in PRINTED]
-    rows = [Row(labels(setting), {"method": setting_name(*setting)}) for setting in (*PRINTED, *again)]
+    rows = [Row(labels(setting), {"method": setting_name(*setting)}) for setting in PRINTED]
     columns = {name: show("accuracy", title, where={"source": name}) for name, title in titles(run).items()}
     sheet = Sheet("table4_kernels", HEADS, rows, columns, intervals)
     caption = "Accuracy of the GPC by kernel and schedule (%)" + stand_ins(run, intervals)
     note = "The rows that the paper prints; table4_grid has all, with their confidence."
-    return sheet.table(caption, "source", [f"{over(sheet)}.", note, *gpytorch_note(sheet)], bold=columns)
+    return sheet.table(caption, "source", [f"{over(sheet)}.", note], bold=columns)
 
 
 @figure(
@@ -145,7 +142,6 @@ def table4_kernels(run: Run, intervals):
     grid=(read_grids, GRID_FILES),
 )
 def kernel_learning_curves(run: Run, grid) -> Figure:
-    grid = grid[grid["kernel"].isin(COLORS)]  # gpytorch's own classes would draw the same curves
     shown = {name: title for name, title in titles(run).items() if (grid["source"] == name).any()}
     if not shown:
         raise InputError("kernels", "have no results for these sources", "run them first")
@@ -243,7 +239,6 @@ def table4_grid(run: Run, grid, intervals):
         f"each seed's own. ELBO: per training sample, mean over the seeds; {interval_over(sheet.seeds)}. If it still "
         "rises from row to row and the confidence lies far below the accuracy, the fit was stopped before it had "
         "converged.",
-        *gpytorch_note(sheet),
     )
     caption = "The GPC by kernel, learning rate and iterations" + stand_ins(run, intervals)
     return sheet.table(caption, "measure", notes, bold=["accuracy", "nll"], same=1)
@@ -265,7 +260,3 @@ def over(sheet: Sheet) -> str:
 
 def stand_ins(run: Run, intervals: Frame) -> str:
     return run.stand_ins([name for name in titles(run) if (intervals["source"] == name).any()], partly=False)
-
-
-def gpytorch_note(sheet: Sheet) -> list[str]:
-    return [GPYTORCH_NOTE] if any(key.endswith(BY_GPYTORCH) for row in sheet.rows for key, _ in row.labels) else []

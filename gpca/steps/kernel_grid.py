@@ -1,7 +1,7 @@
 """Step ``fit_kernel_grid``: the classifier by kernel, learning rate and number of iterations (Table IV)."""
 
 from dataclasses import dataclass, replace
-from typing import Annotated
+from itertools import product
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.settings import Count, Different, Distinct, fields_of
+from gpca.settings import Count, Distinct, fields_of
 
 MEASURES = ("accuracy", "elbo", "confidence", "ece", "nll")
 SETTING = ("kernel", "learning_rate", "iterations")
@@ -28,7 +28,6 @@ PRINTED: tuple[tuple[Kernel, float, int], ...] = (  # the rows of the paper's ta
     ("rbf", 0.001, 200),
     ("polynomial", 0.001, 200),
 )
-BY_GPYTORCH = "_gpytorch"  # suffix of a kernel that is fitted in gpytorch's own classes
 
 
 @dataclass(frozen=True)
@@ -38,8 +37,6 @@ class KernelGrid:
     kernels: Distinct[Kernel] = ("rbf", "matern32", "polynomial")  # each is fitted at every rate
     learning_rates: Distinct[LearningRate] = (0.01, 0.001)
     iterations: Distinct[Count] = (10, 20, 50, 100, 200)  # at which the classifier is evaluated
-    # Fitted once more in gpytorch's own classes, with the printed iterations at the larger rate
-    gpytorch: Annotated[tuple[Kernel, ...], Different(fewest=0)] = ()
     inducing: Count = 64
     draws: Draws = 1000
 
@@ -65,7 +62,6 @@ def evaluate_grid(registrations: Registrations, grid: KernelGrid, source: str, s
     import pandas as pd
 
     from gpca.classifier.gpc import GPC
-    from gpca.classifier.gpytorch_classes import GpytorchGPC
 
     train, test = registrations.rows("train"), registrations.rows("test")
     if not len(train) or not len(test):
@@ -73,24 +69,15 @@ def evaluate_grid(registrations: Registrations, grid: KernelGrid, source: str, s
     h_S_d, concept_S = registrations.embedding, registrations.concept
     target_N = np.array([CONCEPTS.index(concept) for concept in concept_S[test]])
     tested, predictions, rows = registrations.subset(test), [], []
-    fits: list[tuple[str, float, tuple[int, ...], GPC | GpytorchGPC]] = []
-    for kernel in grid.kernels:
-        for rate in grid.learning_rates:
-            settings = GPCSettings(kernel, rate, max(grid.iterations), grid.inducing, grid.draws)
-            fits.append((kernel, rate, grid.iterations, GPC(CONCEPTS, settings, source, seed)))
-    largest = max(rate for _, rate, _ in PRINTED)
-    for kernel, rate, iterations in PRINTED:
-        in_grid = rate in grid.learning_rates and iterations in grid.iterations
-        if kernel in grid.gpytorch and rate == largest and in_grid:
-            settings = GPCSettings(kernel, rate, iterations, grid.inducing, grid.draws)
-            fits.append((kernel + BY_GPYTORCH, rate, (iterations,), GpytorchGPC(CONCEPTS, settings, source, seed)))
-    for name, rate, counts, gpc in fits:
-        for iterations in gpc.fit_up_to(counts, h_S_d[train], concept_S[train]):
+    for kernel, rate in product(grid.kernels, grid.learning_rates):
+        settings = GPCSettings(kernel, rate, max(grid.iterations), grid.inducing, grid.draws)
+        gpc = GPC(CONCEPTS, settings, source, seed)
+        for iterations in gpc.fit_up_to(grid.iterations, h_S_d[train], concept_S[train]):
             scores_N_C, variances_N_C, bald_N = gpc.attribute(h_S_d[test])
             attribution = Attribution.of_scores(
                 CONCEPTS, scores_N_C, seconds=0.0, variances_N_C=variances_N_C, bald_N=bald_N
             )
-            setting = dict(zip(SETTING, (name, rate, iterations), strict=True))
+            setting = dict(zip(SETTING, (kernel, rate, iterations), strict=True))
             predictions.append(prediction_frame(tested, attribution).assign(**setting))
             measured = (
                 np.mean(scores_N_C.argmax(axis=1) == target_N),
@@ -99,6 +86,6 @@ def evaluate_grid(registrations: Registrations, grid: KernelGrid, source: str, s
                 calibration_error(scores_N_C, target_N),
                 negative_log_likelihood(scores_N_C, target_N),
             )
-            rows.append((name, rate, iterations, *measured))
+            rows.append((kernel, rate, iterations, *measured))
     predicted = pd.concat(predictions, ignore_index=True)
     return pd.DataFrame(rows, columns=list(GRID_COLUMNS)), predicted[[*SETTING, *predicted.columns.drop([*SETTING])]]

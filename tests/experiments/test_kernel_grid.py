@@ -62,28 +62,6 @@ def test_table4_has_the_papers_rows_and_a_column_per_source():
     assert "| Matérn 3/2 | 0.01 | 200 | **81.0 (76.0 to 83.0)** | **91.0 (86.0 to 93.0)** |" in table.markdown()
 
 
-def with_gpytorch():
-    """The grid and its intervals, with one row in gpytorch's classes besides."""
-    own, of_own = grid(), intervals()
-    again = own[(own["kernel"] == "rbf") & (own["learning_rate"] == 0.01) & (own["iterations"] == 100)]
-    of_again = of_own[of_own["method"] == "rbf-0.01-100"].assign(method="rbf_gpytorch-0.01-100")
-    return pd.concat([own, again.assign(kernel="rbf_gpytorch")]), pd.concat([of_own, of_again])
-
-
-def test_rows_in_gpytorchs_classes_stand_below_the_printed_ones():
-    both, of_both = with_gpytorch()
-    table = table4_kernels(REAL, of_both)
-    assert [key for key, _ in table.rows[-1]] == ["rbf_gpytorch", "0.01", "100"]
-    assert len(table.rows) == len(PRINTED) + 1
-    assert "| RBF, by gpytorch | 0.01 | 100 | 76.0 (71.0 to 78.0) | 86.0 (81.0 to 88.0) |" in table.markdown()
-    for made in (table, table4_grid(REAL, both, of_both)):
-        assert "By gpytorch: " in made.markdown()
-    for made in (table4_kernels(REAL, intervals()), table4_grid(REAL, grid(), intervals())):
-        assert "gpytorch" not in made.markdown()
-    curves = [len(kernel_learning_curves(run(ycb="YCB"), of).axes[0].get_lines()) for of in (grid(), both)]
-    assert curves[0] == curves[1]
-
-
 def test_rows_and_sources_that_were_not_fitted_are_left_out():
     part = intervals(("ycb",))
     table = table4_kernels(REAL, part[~part["method"].str.endswith("-200")])

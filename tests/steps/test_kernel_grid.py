@@ -14,7 +14,6 @@ from gpca.evaluation.measures import TIDY_COLUMNS, read_clustered, read_metrics,
 from gpca.experiments.kernel_grid import collect, collect_intervals, read_grids, setting_name
 from gpca.io.csv_file import write_csv
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.steps import kernel_grid
 from gpca.steps.kernel_grid import GRID_COLUMNS, SETTING, KernelGrid, evaluate_grid
 
 GRID = KernelGrid(("rbf", "polynomial"), (0.1, 0.01), (2, 6), inducing=6, draws=40)
@@ -86,16 +85,6 @@ def test_intervals_are_of_the_same_measures_over_families(evaluated, grid, tmp_p
     assert (rows["low"] < rows["high"]).all()
     with pytest.raises(InputError, match="no files were given"):
         collect_intervals(None, [])
-
-
-def test_gpytorchs_classes_give_the_printed_row_once_more(embedded, monkeypatch):
-    monkeypatch.setattr(kernel_grid, "PRINTED", (("rbf", 0.1, 6), ("polynomial", 0.01, 6), ("rbf", 0.1, 7)))
-    rows, predictions = evaluate_grid(embedded, replace(GRID, gpytorch=("rbf", "polynomial")), "tiny", 0)
-    *own, added = rows.itertuples(index=False, name=None)
-    assert added[:3] == ("rbf_gpytorch", 0.1, 6)  # not at the smaller rate, nor off the grid
-    [ours] = [row for row in own if row[:3] == ("rbf", 0.1, 6)]
-    assert added[3:] == pytest.approx(ours[3:], abs=1e-4)
-    assert predictions["kernel"].iloc[-1] == "rbf_gpytorch"
 
 
 def test_a_larger_rate_raises_the_bound_further(grid):
