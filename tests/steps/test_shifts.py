@@ -104,13 +104,18 @@ def test_measures_are_of_each_shift_and_of_their_mean(folder):
     assert set(leads["other"]) == {"residuals"} and "ceiling" not in set(leads["method"])
 
 
-def test_both_tables_show_all_explainers_and_shifts(folder):
+def test_both_tables_show_all_explainers_and_shifts(folder, monkeypatch):
     rows = experiment.collect(RUN, [folder / "diagnoses/seed100.csv"], *truth_files(folder))
     whole, by_shift = experiment.table9_shift(RUN, rows).markdown(), experiment.table9_shifts(RUN, rows).markdown()
     assert "| Re-enactment (untrained) | its starts and limits, and every registration method |" in whole
     assert "The aim is " in whole.partition("As learned:")[0]
     assert "| nothing |" in whole and "| its samples |" in whole
-    assert all(f"| {title} |" in by_shift for title in ("As learned", "Scaled", "Planes", "Mean over shifts"))
+    titles = ("As learned, model moved", "Scaled", "Planes", "Mean over shifts")
+    assert all(f"| {title} |" in by_shift for title in titles)
+    monkeypatch.setattr(experiment, "PRODUCT", "scaled")  # what a user does comes first
+    whole, by_shift = experiment.table9_shift(RUN, rows), experiment.table9_shifts(RUN, rows)
+    assert list(whole.columns)[:2] == ["scaled", "standard"]
+    assert by_shift.rows[0][0][1] == "Scaled, as in `gpca explain`"
 
 
 TITLES = {"reenact": "Re-enactment", "residuals": "Residuals"}
