@@ -1,6 +1,5 @@
 import json
 import os
-import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +8,6 @@ import numpy as np
 import pytest
 
 from benchmarks import floor, pipeline
-from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.uncertainty.designs import DESIGNS
 from gpca.uncertainty.outcomes import Outcomes
@@ -19,19 +17,6 @@ ROOT = Path(__file__).resolve().parents[1]
 
 def last_line(text):
     return json.loads(text.splitlines()[-1])
-
-
-def test_edge_conv_ends_with_three_numbers_of_the_same_networks():
-    tiny = ["--threads", "1", "--batch", "2", "--points", "48", "--k", "5", "--repeats", "1"]
-    run = subprocess.run(
-        [sys.executable, "benchmarks/edge_conv.py", *tiny], cwd=ROOT, capture_output=True, text=True, check=True
-    )
-    result = last_line(run.stdout)
-    assert list(result) == ["train_speedup", "infer_speedup", "max_abs_error"]
-    assert result["max_abs_error"] < 1e-3
-    assert result["train_speedup"] > 0
-    assert result["infer_speedup"] > 0
-    assert "2 clouds of 48 points, k = 5, 1 thread(s)" in run.stdout
 
 
 def test_edge_conv_compares_networks_of_equal_embeddings_and_notices_unequal_ones():
@@ -60,18 +45,6 @@ def test_backbones_ends_with_the_numbers_of_each(capsys):
     assert min(result.values()) > 0
     assert result["parameters_pointnet"] == 150_336
     assert "2 clouds of 40 points, 1 thread(s)" in out
-
-
-def test_the_plain_form_is_that_of_the_same_network():
-    import torch
-
-    from benchmarks.backbones import every_slot, make_clouds, make_network
-
-    network, clouds = make_network("pointnext"), make_clouds(2, 64)
-    with every_slot():
-        plain = network(clouds)
-    assert not torch.equal(network(clouds), plain)
-    torch.testing.assert_close(network(clouds), plain, atol=1e-3, rtol=1e-3)
 
 
 @pytest.fixture
@@ -122,10 +95,6 @@ def test_shares_and_overhead_add_up_to_the_core_time(run_folder):
     assert result["peak_mb"] == 620.5
 
 
-def test_wall_time_runs_from_the_start_of_the_first_job_to_the_last_file(run_folder):
-    assert pipeline.wall_time(run_folder) == pytest.approx(16.0)
-
-
 def test_an_existing_run_ends_with_the_documented_line(run_folder, monkeypatch, capsys):
     monkeypatch.setattr(pipeline, "ROOT", run_folder.parent)
     (run_folder.parent / "results").mkdir()
@@ -134,37 +103,6 @@ def test_an_existing_run_ends_with_the_documented_line(run_folder, monkeypatch, 
     result = last_line(capsys.readouterr().out)
     assert list(result) == ["stages", "overhead_share", "peak_mb"]
     assert result["overhead_share"] == pytest.approx(1 - 12 / 32)
-
-
-def test_the_stages_of_a_page_are_the_longest_first_and_small_ones_share_a_row(run_folder):
-    (run_folder / "benchmarks/objects/cup.tsv").write_text("s\tmax_rss\n0.05\tNA\n")
-    head, _, *rows = pipeline.page_table(pipeline.read_stages(run_folder))
-    assert head.startswith("| stage | jobs | time of its jobs (min) |")
-    assert rows == [
-        "| `encoders/` | 1 | 0.2 | 83% | 0.0 |",
-        "| `collect/` | 1 | 0.0 | 8% | 0.0 |",
-        "| `tables/` | 1 | 0.0 | 8% | 0.0 |",
-        "| all others | 1 | 0.0 | 0% | 0.0 |",
-    ]
-
-
-def test_a_missing_run_is_one_line_and_status_2(capsys):
-    assert pipeline.main(["--existing", "no_such_run"]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
-
-
-@pytest.mark.parametrize("text", ["", "{", "[]", '{"peak_memory_mb": 1}', '{"seconds": "long", "peak_memory_mb": 1}'])
-def test_a_damaged_record_is_named(run_folder, text):
-    (run_folder / "objects" / "cup.npz.provenance.json").write_text(text)
-    with pytest.raises(InputError, match=r"cup\.npz\.provenance\.json: has no number 'seconds'"):
-        pipeline.read_stages(run_folder)
-
-
-def test_a_run_without_records_is_refused(tmp_path):
-    with pytest.raises(InputError, match="has no"):
-        pipeline.read_stages(tmp_path)
-    with pytest.raises(InputError, match="has no benchmark files"):
-        pipeline.wall_time(tmp_path)
 
 
 def isotropic(registrations, variance_S_K):
@@ -237,16 +175,6 @@ def test_active_learning_compares_equal_bald_and_ends_with_its_numbers(capsys):
     assert list(result) == ["bald_speedup", "select_ms", "retrain_s", "max_abs_error"]
     assert result["max_abs_error"] < 1e-9
     assert "BALD of 30 embeddings, 20 draws" in out
-
-
-def test_latency_times_a_model_of_ones_own(model, tmp_path, capsys):
-    from benchmarks import latency
-
-    model.save(tmp_path / "model.pt")
-    latency.main(["--model", str(tmp_path / "model.pt"), "--points", "64", "--pairs", "2", "--repeats", "2"])
-    lines = capsys.readouterr().out.splitlines()
-    assert set(json.loads(lines[-1])) == {"median_ms", "median_ms_fast", "median_ms_gpca_alone"}
-    assert any(line.startswith("diagnosis ") for line in lines)
 
 
 def test_latency_times_whole_commands_of_an_installed_package(tmp_path, capsys):

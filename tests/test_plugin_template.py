@@ -12,7 +12,7 @@ from gpca.alignment.methods.registry import method_module
 from gpca.config.check import check
 from gpca.config.layers import without_false
 from gpca.experiments.run import names_of
-from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module
+from gpca.explainers.registry import CAUSES, explainer_module
 from gpca.objects.source import source_modules
 from gpca.process.code_files import code_files
 from gpca.process.plugins import GROUPS
@@ -63,10 +63,3 @@ def test_its_config_gives_a_row_of_each_kind_and_its_files_are_code_of_these(ins
     for module in modules:
         name = module.replace(".", "/")
         assert any(file.endswith(f"examples/plugin/{name}.py") for file in code_files(module))
-
-
-def test_its_explainer_says_more_than_chance(installed, registrations):
-    explainer = explainer_entry("my_nearest_quality").make("tiny", 0)
-    explainer.fit(registrations.subset(registrations.rows("train")))
-    test = registrations.subset(registrations.rows("test"))
-    assert (explainer.explain(test.without_labels()).predicted_N == test.concept).mean() > 0.5

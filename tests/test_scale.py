@@ -70,16 +70,6 @@ def test_a_larger_run_has_as_many_of_each_and_passes_the_check():
         scale.larger_config(2, 4, 20)
 
 
-def test_a_run_with_a_job_that_was_not_recorded_is_refused(run_folder, tmp_path, capsys):
-    assert scale.main([str(tmp_path / "nowhere")]) == 2
-    assert "nowhere: has no benchmark files" in capsys.readouterr().err
-    (run_folder / "benchmarks/objects/ycb.tsv").unlink()
-    assert scale.main([str(run_folder)]) == 2
-    assert capsys.readouterr().err.endswith(
-        "has no benchmarks/objects/ycb.tsv; finish the run, or give its --configfile and --config\n"
-    )
-
-
 def test_a_run_that_was_not_made_is_expected_from_the_times_of_its_rules(run_folder, tmp_path, capsys):
     jobs = len(list(run_folder.rglob("*.tsv")))
     expect = [str(run_folder), "--cores", "1", "2", "--expect", str(tmp_path / "other.yaml"), "--rules", "99"]
@@ -101,13 +91,6 @@ def test_a_run_that_was_not_made_is_expected_from_the_times_of_its_rules(run_fol
     for value, fault in {"page=2": "is no factor or time", "no_rule=2x": "names no job of the plan"}.items():
         assert scale.main([*expect, "--given", value]) == 2
         assert f"--given {value}: {fault}; " in capsys.readouterr().err
-
-
-def test_the_last_name_that_fits_counts():
-    jobs = [Job((), ("a",), "benchmarks/readings/pool.tsv", 0, 1, "reading"), Job((), ("b",), "b.tsv", 0, 1, "page")]
-    seconds = {job.benchmark: 10.0 for job in jobs}
-    assert list(scale.given(jobs, seconds, ["reading=3x"]).values()) == [30, 10]
-    assert list(scale.given(jobs, seconds, ["*=2x", "readings/p*=2.5s"]).values()) == [2.5, 20]
 
 
 def test_the_times_of_rules_are_kept_for_later_runs(run_folder, tmp_path, monkeypatch):

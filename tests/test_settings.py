@@ -168,11 +168,3 @@ def test_the_settings_of_several_classes_are_taken_out_of_a_section():
     section = {"size": 3, "role": "development", "methods": {}}
     assert fields_of(section, Inner) == {"size": 3}
     assert fields_of(section, Inner, Others) == {"size": 3, "role": "development"}
-
-
-def test_a_mapping_that_is_no_dictionary_is_read_as_one():
-    from gpca.declarations.plan import Recorded
-
-    given = Recorded({"limits": {"low": 0.5}})
-    assert read_settings(dict, given) == {"limits": {"low": 0.5}}
-    assert "limits.low" in given.read

@@ -8,7 +8,6 @@ import pytest
 from benchmarks import targets
 from benchmarks.schedule import Job, critical_path, wall_time
 from benchmarks.targets import cost, read_plan
-from gpca.errors import InputError
 
 HEADER = "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\tcpu_time\n"
 TABLE2 = 2 + 4 + 4 + 4 + 4 + 1  # objects, registrations, encoders, embeddings, GP-CA twice for two sources; the table
@@ -73,14 +72,6 @@ def test_a_target_with_a_job_that_was_not_recorded_is_not_measured(smoke_plan, r
     assert cost(by_target["figures/objects_coffee_cup.png"], run_folder, cores=2).jobs == 2
 
 
-def test_memory_that_was_not_sampled_is_left_out(run_folder, smoke_plan):
-    (run_folder / "benchmarks/figures/objects_ycb.tsv").write_text(
-        HEADER + "0.1\t0:00:00\tNA\tNA\tNA\tNA\tNA\tNA\t0\t0\n"
-    )
-    by_target = targets.targets(read_plan(smoke_plan, "smoke"))
-    assert cost(by_target["figures/objects_ycb.png"], run_folder, cores=2).peak_mb == 100
-
-
 def test_the_command_prints_the_table_and_writes_it_into_its_page(
     smoke_plan, run_folder, tmp_path, monkeypatch, capsys
 ):
@@ -117,9 +108,3 @@ def test_faults_are_one_line_and_status_2(smoke_plan, run_folder, tmp_path, monk
     (run_folder / "benchmarks/objects/ycb.tsv").write_text("nothing\n")
     assert targets.main([str(run_folder)]) == 2
     assert "ycb.tsv: has no number 's'; repeat the run" in capsys.readouterr().err
-
-
-def test_a_plan_that_cannot_be_made_says_why(tmp_path):
-    (tmp_path / "bad.yaml").write_text("sedes: [0]\n")
-    with pytest.raises(InputError, match="cannot be made: gpca: config key sedes: unknown"):
-        targets.plan("mine", tmp_path / "bad.yaml", [])

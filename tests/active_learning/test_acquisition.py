@@ -66,11 +66,6 @@ def test_only_an_oracle_is_told_the_truth(name):
     assert selected(name, make_pool(truth_N=np.full(40, "")), 4) == selected(name, make_pool(), 4)
 
 
-def test_the_largest_values_come_first_and_of_equals_the_first():
-    assert top(np.array([1.0, 3.0, 2.0, 3.0, 0.0]), 3).tolist() == [1, 3, 2]
-    assert top(np.array([1.0, 2.0]), 5).tolist() == [1, 0]
-
-
 SCORES = [[0.98, 0.01, 0.01], [0.48, 0.48, 0.04], [0.34, 0.33, 0.33], [0.9, 0.1, 0.0], [0.44, 0.28, 0.28]]
 
 

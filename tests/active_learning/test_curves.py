@@ -92,11 +92,6 @@ def test_metrics_are_tidy_and_gains_are_paired_with_random_of_the_same_start(fil
     assert "area_gain" not in set(metrics.loc[metrics["method"] == "random", "metric"])
 
 
-def test_curves_that_end_at_other_labels_have_no_gain(files):
-    write_curves(files["bald"], {("pretrained", "pose"): pool_curve(0.5, 0.95, 0.95)}, POOL_COLUMNS)
-    assert "area_gain" not in set(collect_curves(files.values(), target=0.9)["metric"])
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [

@@ -38,18 +38,6 @@ def test_an_answer_is_on_the_disk_at_once_and_the_earlier_ones_stay(path):
     assert LabelFile(path, dict.fromkeys(KEYS)).labels == {KEYS[20]: "overlap", KEYS[21]: ""}
 
 
-HEAD = "sample,split,concept\n"
-
-
-@pytest.mark.parametrize(
-    ("text", "labels"), [("", {}), (HEAD, {}), ("\n", {}), (HEAD + "3,train,pose\n3,train,pose\n", {KEYS[3]: "pose"})]
-)
-def test_a_file_without_answers_is_a_start_and_the_same_answer_twice_no_conflict(path, text, labels):
-    path.parent.mkdir()
-    path.write_text(text)
-    assert LabelFile(path, dict.fromkeys(KEYS)).labels == labels
-
-
 @pytest.mark.parametrize(
     ("lines", "message"),
     [
@@ -118,8 +106,3 @@ def test_an_interrupted_session_continues_with_what_it_knew(path):
     again = session(path)
     assert again.gpc.classes == whole.gpc.classes
     assert np.abs(again.gpc.attribute(H)[0] - whole.gpc.attribute(H)[0]).max() < 0.01
-
-
-def test_one_known_concept_is_too_few():
-    with pytest.raises(InputError, match="fewer than two labeled concepts"):
-        Session(H, KEYS, {KEYS[0]: "noise"}, LabelFile("nowhere.csv", {}), SETTINGS)

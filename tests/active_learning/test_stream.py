@@ -22,8 +22,6 @@ SETTINGS = ActiveLearningSettings(gpc=QUICK)
 STREAM = StreamSettings(arrivals=90, quiet=30, budget=0.2, window=20, every=15)
 CENTERS = 4 * np.random.default_rng(0).normal(size=(3, 8))
 
-both = pytest.mark.parametrize("strategy", ["stream_random", "stream_bald"])
-
 
 def blobs(n, seed, concepts=CONCEPTS):
     concept_N = np.array(concepts)[np.arange(n) % len(concepts)]
@@ -70,16 +68,6 @@ def test_a_pool_too_small_for_the_stream_is_named(plain, arrivals, quiet):
         arrival_order(plain, StreamSettings(arrivals=arrivals, quiet=quiet), "blobs", 0)
 
 
-@both
-@pytest.mark.parametrize("between, expected", [(15, [0, 15, 30, 45, 60, 75, 90]), (40, [0, 40, 80])])
-def test_there_is_a_row_every_so_many_arrivals(task, gpc, strategy, between, expected):
-    rows = run(task, gpc, strategy, every=between)
-    assert rows["arrived"] == expected
-    assert rows["present"] == [arrived >= 30 for arrived in expected]
-    assert np.isnan(rows["running"][0])
-    assert not np.isnan(rows["running"][1:]).any()
-
-
 @pytest.mark.parametrize("budget", [0.05, 0.1, 0.3])
 def test_bald_stays_within_the_budget_but_for_the_first_few(task, gpc, budget):
     rows = run(task, gpc, "stream_bald", budget=budget)
@@ -94,12 +82,6 @@ def test_random_asks_about_the_budgets_share(task, gpc):
     ]
     assert np.mean([row["labels"] for row in asked]) == pytest.approx(0.2 * 90, abs=5)
     assert len({row["labels"] for row in asked}) > 1
-
-
-@pytest.mark.parametrize("strategy", STREAMS)
-def test_the_same_axes_give_the_same_rows(task, gpc, strategy):
-    one, again = (run(task, gpc, strategy, arrivals=45) for _ in range(2))
-    assert all(np.array_equal(one[name], again[name], equal_nan=True) for name in one)
 
 
 @pytest.mark.parametrize("strategy", sorted(STREAMS.keys() - {"stream_random"}))
@@ -127,19 +109,6 @@ def test_the_running_accuracy_is_that_of_the_last_window(task, gpc):
     assert of_all["running"][90] == pytest.approx(1 - is_new.mean())
     expected = [1, 1 - is_new[30:50].mean(), 1 - is_new[70:90].mean()]
     assert [rows["running"][n] for n in (30, 50, 90)] == pytest.approx(expected)
-
-
-def test_where_nothing_is_asked_nothing_is_learned(task, gpc):
-    rows = run(task, gpc, "stream_random", budget=1e-9)
-    for name, value in (("labels", 0), ("new_labels", 0), ("accuracy_new", 0.0), ("accuracy", rows["accuracy"][0])):
-        assert rows[name] == [value] * 7
-
-
-@both
-def test_the_classifier_given_is_left_as_it_was(task, gpc, strategy):
-    before = [array.tobytes() for array in gpc.attribute(task.test.h)]
-    assert run(task, gpc, strategy)["labels"][-1] > 0
-    assert [array.tobytes() for array in gpc.attribute(task.test.h)] == before
 
 
 RANDOM = np.random.default_rng(0)

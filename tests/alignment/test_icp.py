@@ -5,7 +5,6 @@ from scipy.spatial.transform import Rotation
 
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.icp import ICP, ICPSettings
-from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds, write_objects
 from gpca.objects.source import resolve, surfaces
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Severities
@@ -24,11 +23,6 @@ def test_the_initial_pose_decides_where_icp_starts(objects):
     source = transform(inverse(T_true), points)
     assert np.allclose(icp.register(source, T_true).T_target_source, T_true, atol=1e-6)
     assert not np.allclose(icp.register(source, INIT).T_target_source, T_true, atol=0.1)
-
-
-def test_an_unknown_method_is_named():
-    with pytest.raises(InputError, match=r"'icp2': unknown; choose one of point_to_point, point_to_plane, generalized"):
-        ICPSettings("icp2")
 
 
 @pytest.fixture(scope="module")

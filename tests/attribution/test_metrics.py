@@ -6,11 +6,11 @@ import pandas as pd
 import pytest
 
 from gpca.attribution import metrics as m
-from gpca.attribution.metrics import collect, collect_timings, concept_accuracy, confusion
+from gpca.attribution.metrics import collect, collect_timings, confusion
 from gpca.attribution.predictions import write_predictions as written_by_the_suite
 from gpca.classifier.scores import Attribution
 from gpca.errors import InputError
-from gpca.evaluation.measures import read_metrics, write_metrics
+from gpca.evaluation.measures import read_metrics
 
 CONCEPTS = ("noise", "pose", "overlap")
 TRUE = np.array(["noise", "noise", "pose", "pose", "pose"])
@@ -35,11 +35,6 @@ def value(metrics, metric, concept="all", seed=0):
     chosen = metrics[(metrics.metric == metric) & (metrics.concept == concept) & (metrics.seed == seed)]
     assert len(chosen) == 1
     return chosen.value.item()
-
-
-def test_accuracy_counts_abstained_samples_as_wrong():
-    assert concept_accuracy(TRUE, PREDICTED, SURE, CONCEPTS) == {"all": 3 / 5, "noise": 1 / 2, "pose": 2 / 3}
-    assert concept_accuracy(TRUE, PREDICTED, np.array([True, True, False, False, False]), ()) == {"all": 2 / 5}
 
 
 def test_collect_is_tidy_and_looks_at_test_rows_only(tmp_path):
@@ -159,14 +154,6 @@ def test_a_faulty_causal_file_is_refused_in_one_line(tmp_path, columns, expected
         collect([predictions], [causal])
     assert str(caught.value).startswith(str(causal))
     assert "\n" not in str(caught.value)
-
-
-def test_metrics_survive_the_file_unchanged_and_have_the_same_bytes(tmp_path):
-    metrics = collect([write_predictions(tmp_path / "ycb" / "gpca" / "seed0.csv")])
-    write_metrics(metrics, tmp_path / "a.csv")
-    write_metrics(read_metrics(tmp_path / "a.csv"), tmp_path / "b.csv")
-    assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
-    pd.testing.assert_frame_equal(read_metrics(tmp_path / "a.csv"), metrics, check_dtype=False)
 
 
 def test_timings_are_means_over_the_test_samples(tmp_path):

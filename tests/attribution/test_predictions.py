@@ -45,21 +45,6 @@ def test_the_prediction_file_has_the_columns_and_values_of_the_schema(tmp_path, 
     assert np.allclose(rows.filter(regex="score_|variance_|bald").astype(float), numbers, atol=5.1e-7)
 
 
-def test_an_explainer_without_variances_and_bald_leaves_them_empty(tmp_path, registrations):
-    path = tmp_path / "seed0.csv"
-    write_predictions(path, registrations, attribution(len(registrations), variances_N_C=None, bald_N=None))
-    rows = read_predictions(path)
-    assert rows.filter(like="variance_").isna().all(axis=None)
-    assert set(rows["bald"]) == {""}
-
-
-def test_the_same_predictions_give_the_same_bytes(tmp_path, registrations):
-    for name, seed in (("a", 0), ("b", 0), ("c", 1)):
-        write_predictions(tmp_path / name, registrations, attribution(len(registrations), seed))
-    first, second, other = ((tmp_path / name).read_bytes() for name in "abc")
-    assert first == second != other
-
-
 def test_timings_survive_the_file_and_must_be_of_the_same_samples(tmp_path, registrations):
     path = tmp_path / "seed0.csv"
     first = replace(registrations.subset(np.arange(2)), sample=np.array([3, 3]), split=np.array(["train", "test"]))

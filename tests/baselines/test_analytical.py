@@ -2,9 +2,7 @@ import numpy as np
 import pytest
 
 from baselines.analytical import AnalyticalGPC
-from gpca.classifier.settings import GPCSettings
-from gpca.errors import InputError
-from gpca.explainers.registry import explainer_entry, require_settings
+from gpca.explainers.registry import explainer_entry
 
 QUICK = {"learning_rate": 0.1, "iterations": 60, "inducing": 16, "draws": 200, "shape_points": 64}
 NAMES = ("analytical_gpc", "analytical_gpc_no_counts")
@@ -31,15 +29,3 @@ def test_the_point_count_ratio_is_the_last_feature_of_the_one_and_none_of_the_ot
     rows = np.array([50, 7, 20])  # the points drawn are named by split and sample
     assert np.array_equal(AnalyticalGPC("tiny", 0, **QUICK)._inputs(registrations.subset(rows)), with_counts[rows])
     assert not np.array_equal(AnalyticalGPC("tiny", 1, **QUICK)._inputs(registrations), with_counts)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_the_config_may_set_what_the_classifier_and_the_features_take(name):
-    require_settings(name, {"shape_points": 64, "neighbours": 8, **vars(GPCSettings())})
-    for fault, message in (
-        ({"neighbours": 2}, "setting neighbours: 2 should be greater than or equal to 4"),
-        ({"kernel": "linear"}, "setting kernel"),
-        ({"point_counts": True}, "setting point_counts: unknown"),
-    ):
-        with pytest.raises(InputError, match=message):
-            require_settings(name, fault)

@@ -7,7 +7,7 @@ from baselines.sensitivity import ONE_AT_A_TIME, single_drops
 from baselines.shap_kl import ALL_CORNERS
 from baselines.values import WORTHS, KnobValues
 from gpca.errors import InputError
-from gpca.explainers.registry import explainer_entry, require_settings
+from gpca.explainers.registry import explainer_entry
 from gpca.pairs.perturbation import CONCEPTS
 
 SCALED = ("shap_removal", "sa_local_removal")
@@ -133,11 +133,3 @@ def test_equal_scores_name_no_concept_but_two_equal_largest_do_and_corners_are_t
     eleven = np.arange(len(attached) * 11, dtype=float).reshape(-1, 11)
     read = KnobValues(lambda worth: -worth, None, "tiny", 0).remedy_values
     assert np.array_equal(read(with_arrays(attached, uncertainty=eleven), "uncertainty"), eleven[:, :8])
-
-
-@pytest.mark.parametrize("name", (*SCALED, *LEARNED))
-def test_the_config_may_set_what_they_take_and_no_more(name):
-    require_settings(name, {"worth": "residual"} if name in SCALED else {"inverse_regularisation": 0.1})
-    for wrong in ("fitness", "") if name in SCALED else ("residual",):
-        with pytest.raises(InputError, match=f"explainer '{name}'"):
-            require_settings(name, {"worth": wrong})

@@ -131,12 +131,6 @@ def test_every_subset_of_the_causes_is_drawn():
     assert len(np.unique(drawn, axis=0)) == 8
 
 
-def test_a_small_cloud_is_divided_between_the_two(subjects):
-    candidate = draw_candidate(subjects[0].surface[:100], np.ones(3, bool), SETTINGS, np.random.default_rng(0))
-    assert (len(candidate.model), len(candidate.clean)) == (50, 50)
-    assert len(candidate.kept) >= 16
-
-
 CONFIG = with_defaults()
 FEWER = {"train": 30, "test": 12, "clean_pairs": 20, "points": (128, 256)}
 LIMITS = {"nominal": 0.02, "failed": 0.03}

@@ -11,7 +11,6 @@ from gpca.causes.descriptors import (
     NOISE,
     OVERLAP,
     POSE,
-    RESIDUALS,
     STARTS,
     WIDTHS,
     Descriptors,
@@ -159,13 +158,6 @@ def test_quick_remedies_show_no_run_that_restarts_and_nothing_that_is_relative_t
     assert len(shown) == 3 * 4 + 2
     assert not any(name.startswith(("error", "phi")) for name in shown)
     assert {name.split("_")[1] for name in shown[:-2]} == {"2", "3", "6", "7"}  # subsets with the pose error left alone
-
-
-def test_some_columns_of_some_groups_are_wanted():
-    found = seen(NUMBERED, ("pair", "motion", "runs"), RESIDUALS)[0]
-    assert found.tolist() == [*range(0, 3 * QUANTILES, 2), *NUMBERED["motion"][0]]
-    with pytest.raises(ValueError, match="need at least one array"):
-        seen(NUMBERED, ("motion",), {"entropy": slice(None)})
 
 
 def remedied(pair):

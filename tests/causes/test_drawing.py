@@ -169,13 +169,6 @@ def test_a_split_is_full_when_every_group_is(order):
     assert wanted.all_filled()
 
 
-def test_without_a_range_either_kind_fills_the_share():
-    wanted = quotas(several=(0.0, 1.0))
-    fill(wanted, ("noise", True))
-    assert wanted._count("noise") == 18
-    assert not wanted.wants(("noise", False))
-
-
 def test_a_candidate_is_wanted_as_long_as_it_can_be():
     wanted = quotas()
     assert wanted.wants_applied(NEITHER)

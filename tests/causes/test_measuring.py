@@ -37,13 +37,6 @@ def test_the_seeds_take_turns_with_the_folds_that_a_file_names(subjects):
     assert tested == of_fold * 2
 
 
-@pytest.mark.parametrize("share", [0.001, 0.999])
-def test_each_split_has_an_object(subjects, share):
-    split = split_by_object(subjects, "four", 100, replace(SETTINGS, test_objects=share))
-    assert split["train"]
-    assert split["test"]
-
-
 def test_one_object_cannot_be_split(subjects):
     views = [replace(subjects[0], name=f"mug_1_1_{view}", family="mug") for view in range(5)]
     for too_few in (subjects[:1], views):

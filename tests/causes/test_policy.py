@@ -45,12 +45,6 @@ def test_after_attempts_without_improvement_a_case_is_queued():
     assert POLICY.decide(said, before=[*before[:2], Treated("noise", 0.11)]).action != QUEUE
 
 
-def test_a_concept_that_nothing_treats_is_queued():
-    policy = RecoveryPolicy(treatments={"pose": "reinitialize"})
-    assert policy.decide(scores(noise=0.8, pose=0.1, overlap=0.1)).action == QUEUE
-    assert policy.decide(scores(noise=0.1, pose=0.8, overlap=0.1)).action == "reinitialize"
-
-
 def test_the_chosen_uncertainty_is_exceeded_by_the_declared_share_at_most():
     bald_N = np.random.default_rng(0).permutation(20) / 20
     for share, above in ((0.0, 0), (0.04, 0), (0.05, 1), (0.25, 5)):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from baselines.shap_kl import shapley_values as by_library
-from gpca.causes.truth import ALL, NONE, SUBSETS, Truth, shapley_values
+from gpca.causes.truth import ALL, NONE, Truth, shapley_values
 
 LIMITS = {"nominal_limit": 0.02, "failed_limit": 0.03, "cause_limit": 0.01, "uncertainty_limit": 5.0}
 
@@ -73,9 +73,3 @@ def test_the_values_are_those_of_all_orders_and_of_the_library():
     # A cause that changes nothing has no part.
     worth[:, [2, 3, 6, 7]] = worth[:, [0, 1, 4, 5]]
     assert (shapley_values(worth)[:, 1] == 0).all()
-
-
-def test_subsets_are_numbered_by_bits():
-    assert SUBSETS[NONE] == ()
-    assert SUBSETS[ALL] == (0, 1, 2)
-    assert SUBSETS[5] == (0, 2)

@@ -120,13 +120,6 @@ def test_the_elbo_never_falls_from_one_iteration_to_the_next_and_single_ones_are
     assert_equal_posterior(latents, together[1], 1e-12)
 
 
-@pytest.mark.parametrize("first", [6, 40])
-def test_a_warm_start_ends_where_a_cold_one_does(projection, best, first):
-    early, _ = refined(projection[:first], TARGETS[:first])
-    _, warm = refined(projection, sites=early.extend(len(TARGETS), 3))
-    assert_equal_posterior(warm, best[1], 1e-5)
-
-
 def test_a_warm_start_from_the_best_posterior_ends_at_once_and_a_looser_tolerance_earlier_close_by(projection, best):
     sites, latents, done = refine(projection, TARGETS, best[0], iterations=100, tolerance=1e-5)
     assert done == 1
@@ -157,14 +150,6 @@ def test_silent_sites_give_the_prior_and_leave_a_posterior_as_it_was(projection,
     sites, latents = best
     twice = projection.followed_by(projection[:5])
     assert_equal_posterior(sites.extend(len(twice), 3).posterior(twice), latents, 1e-12)
-
-
-@pytest.mark.parametrize("seed", [0, 1])
-def test_the_divergence_is_torchs(seed):
-    random = np.random.default_rng(seed)
-    factor_C_M_M = random.normal(size=(3, 5, 5))
-    latents = Latents(random.normal(size=(3, 5)), factor_C_M_M @ np.swapaxes(factor_C_M_M, 1, 2) + 0.1 * np.eye(5))
-    assert latents.divergence() == pytest.approx(torch_divergence(latents))
 
 
 def test_the_posterior_of_sites_is_that_of_linear_regression():

@@ -126,8 +126,3 @@ def test_the_divergence_is_torchs():
     prior = torch.distributions.MultivariateNormal(torch.zeros(9), torch.eye(9))
     expected = torch.distributions.kl_divergence(q, prior).sum().item()
     assert model.divergence().item() == pytest.approx(expected, rel=1e-4)
-
-
-def test_as_many_samples_as_latents_are_not_transposed():
-    model, _ = fitted("rbf", 40, inputs=INPUTS[:3], targets=torch.tensor([1, 2, 0]))
-    assert model.marginals(INPUTS[:3])[0].argmax(dim=0).tolist() == [1, 2, 0]

@@ -21,7 +21,6 @@ from gpca.comparison.claims import (
     judge,
     read_claims,
     read_verdicts,
-    separability,
     verdict_of_interval,
 )
 from gpca.comparison.published import UNITS, read_published
@@ -221,13 +220,6 @@ def test_shares_have_the_farther_bounds_of_seeds_and_clusters():
     against_number = replace(CLAIM, compared=(Compared(ACCURACY, 50.0), Compared(50.0, ACCURACY)))
     one, other = judge([against_number], alike, OBJECTS, clusters=draws).itertuples()
     assert (one.low, one.high) == pytest.approx((-other.high, -other.low))
-
-
-def test_scores_that_tell_all_classes_apart_have_an_area_of_one():
-    p_S_C = np.array([[0.8, 0.1, 0.1], [0.7, 0.2, 0.1], [0.1, 0.8, 0.1], [0.2, 0.1, 0.7]])
-    assert separability(p_S_C, np.array([0, 0, 1, 2])) == 1
-    assert separability(np.full((4, 3), 1 / 3), np.array([0, 0, 1, 2])) == 0.5
-    assert np.isnan(separability(p_S_C, np.zeros(4, int)))
 
 
 def test_times_are_compared_by_their_means_and_scatter():

@@ -42,12 +42,6 @@ def test_a_number_is_produced_or_between_readings_or_outside(value, where, words
     assert words in reason
 
 
-def test_a_number_that_is_reproduced_needs_no_reading():
-    found, comparison = judged(97.0, {"random": 0.5}, here=0.97)
-    assert summarize(found) == {}
-    assert with_readings(comparison, found, WORDS)["reason"].tolist() == comparison["reason"].tolist()
-
-
 def test_the_joint_reading_fits_most_numbers_of_its_group():
     numbers = [number(50.0), number(60.0, row="Cups", counterpart=OF_CUPS)]
     results = {"metrics.csv": pd.concat([tidy([0.9, 0.9]), tidy([0.9, 0.9], source="cups")])}

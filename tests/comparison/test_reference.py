@@ -108,13 +108,6 @@ def test_one_of_many_values_is_enough_and_is_named(folders):
     )
 
 
-def test_yes_and_no_are_results(folders):
-    heads = ("learner", "accurate", "mean", "ci_low", "ci_high", "n_seeds", "n_test")
-    for folder, answer in zip(folders, ("no", "yes"), strict=True):
-        write(folder / "tables/table5_answers.csv", heads, [("gpca", answer, 1.0, "", "", 1, 9)])
-    assert outcomes(folders)["tables/table5_answers.csv"].verdict == "identical"
-
-
 def test_the_largest_difference_is_measured_by_what_is_allowed(folders):
     change(folders[0] / "metrics.csv", ACCURACY, "gpca,accuracy,all,0,0.76\n")
     change(folders[0] / "metrics.csv", "noise,all,0,50\n", "noise,all,0,52\n")

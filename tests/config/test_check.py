@@ -265,17 +265,6 @@ def test_values_of_the_command_line_have_the_types_of_a_config_file():
     assert list(check(config)) == ["coffee_cup", "ycb"]
 
 
-@pytest.mark.parametrize("text", ["a: b: c", "{", "/data: x", "2024-01-01", "[a, b]", "12:30", "010", "1_000", "on"])
-def test_text_that_is_no_number_stays_text(text):
-    assert given(downloads=text)["downloads"] == text
-
-
-def test_what_the_command_line_did_not_give_stays_as_it_is():
-    config = load() | {"seeds": ["0"], "registrations": {"train": "36"}}
-    assert with_types(config, {}) == config
-    assert with_types(config, {"seeds": [1], "registrations": {"train": 37}, "other": "1"}) == config
-
-
 def test_a_number_in_place_of_a_list_is_one_line_that_says_how():
     with pytest.raises(InputError) as caught:
         check(given(seeds=0))

@@ -141,13 +141,6 @@ def test_what_killed_runs_left_goes_and_what_continues_them_stays(here):
     assert files(here / ".snakemake") == set(KEPT)
 
 
-def test_a_fresh_folder_has_nothing_to_clear(tmp_path, monkeypatch):
-    (tmp_path / "fresh").mkdir()
-    monkeypatch.chdir(tmp_path / "fresh")
-    clear_leftovers([])
-    assert files(tmp_path / "fresh" / ".snakemake") == set()
-
-
 def test_nothing_of_one_that_lives_is_touched_until_it_was_killed(here, start):
     clear_leftovers([])
     restart._locks.pop().close()

@@ -3,8 +3,6 @@
 import json
 from types import SimpleNamespace
 
-import pytest
-
 from gpca.declarations.plan import Run
 from gpca.declarations.step import Plan, Step, all_files, rules_of
 
@@ -105,11 +103,6 @@ def test_lists_have_the_plural_of_their_name():
 
 def test_a_step_that_a_run_does_without_has_no_rule():
     assert rules_of(step(when=lambda plan: False), PLAN) == []
-
-
-def test_a_key_that_the_config_lacks_is_a_slip_of_the_declaration():
-    with pytest.raises(KeyError, match="nothing"):
-        rules_of(step(settings=("nothing",)), PLAN)
 
 
 def test_data_comes_from_outside_the_run():

@@ -99,14 +99,6 @@ def test_a_cloud_does_not_depend_on_the_others_of_its_batch(encoder):
     torch.testing.assert_close(encoder(clouds()[2:3]), encoder(clouds())[2:3], atol=1e-5, rtol=1e-5)
 
 
-@pytest.mark.parametrize(("centroids", "same"), [(20, True), (16, False)])
-def test_at_most_half_of_the_points_are_centroids(centroids, same):
-    """Forty points have 20 centroids, whether 32 are wanted or 20."""
-    encoder, other = (make_encoder("pointnet2", {"width": 8, "centroids": number}) for number in (32, centroids))
-    other.load_state_dict(encoder.state_dict())
-    assert torch.equal(other(clouds(n=40)), encoder(clouds(n=40))) == same
-
-
 @backbones
 def test_the_gradient_reaches_every_parameter(backbone):
     torch.manual_seed(0)

@@ -118,12 +118,6 @@ def test_gradient_check_in_double_precision(as_written):
     assert torch.autograd.gradcheck(lambda x: layer(x), (x,), atol=1e-6)
 
 
-def test_neighbors_are_the_nearest():
-    x = torch.randn(3, 50, 4)
-    expected = torch.cdist(x, x).topk(7, largest=False).indices.sort().values
-    assert torch.equal(knn_indices(x, 7).long().sort().values, expected)
-
-
 def rows_of_all_kinds():
     random = np.random.default_rng(0)
     yield from random.normal(size=(20, 60))

@@ -69,12 +69,6 @@ def test_the_confident_bound_holds_for_the_promised_share_of_draws():
     assert np.mean(covered >= level) == pytest.approx(exact, abs=4 * np.sqrt(exact * (1 - exact) / DRAWS))
 
 
-@pytest.mark.parametrize("share", [0, 1, -0.1, 1.5, np.nan])
-def test_a_share_has_to_lie_between_0_and_1(share):
-    with pytest.raises(InputError, match=r"level: .* is not strictly between 0 and 1; give a share"):
-        conformal.require_share("level", share)
-
-
 STATES = ("good", "poor", "lost")
 
 

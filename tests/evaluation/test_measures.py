@@ -4,7 +4,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gpca.errors import InputError
 from gpca.evaluation import measures as m
 from gpca.evaluation.intervals import REPEATS, Clustered
 from gpca.evaluation.measures import (
@@ -110,13 +109,3 @@ def test_files_of_both_forms_are_read_back(samples, tmp_path):
     write_metrics(intervals(records, "tiny"), tmp_path / "against.csv")
     rows = m.read_clustered(tmp_path / "against.csv")
     assert rows[list(m.AGAINST)].to_numpy().tolist() == [["", ""], ["rival", "b"], ["", ""], ["rival", "a"]]
-
-
-def test_samples_are_named_by_their_files(tmp_path):
-    path = tmp_path / "methods/ycb/gicp/seed3.csv"
-    path.parent.mkdir(parents=True)
-    path.write_text("x\n1\n")
-    rows = m.read_samples([path], pd.read_csv)
-    assert rows.iloc[0].to_dict() == {"x": 1, "source": "ycb", "method": "gicp", "seed": 3}
-    with pytest.raises(InputError, match="no files were given"):
-        m.read_samples([], pd.read_csv)

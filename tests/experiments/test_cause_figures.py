@@ -11,7 +11,6 @@ from gpca.experiments.cause_figures import (
     TRUTH,
     _draw_scores,
     _draw_waterfall,
-    draw_causes_example,
     draw_failures,
     is_clear,
     usual_failure,
@@ -92,13 +91,3 @@ def test_a_failure_of_each_cause_is_shown_with_who_names_it(causes, tmp_path):
         shown = f"{concept}: {100 * errors[len(errors) // 2]:.0f} % off" if len(errors) else f"no failure by {concept}"
         [caption] = [each for each in words if each.startswith(shown)]
         assert not len(errors) or "right: all-knowing" in caption
-
-
-def test_the_figure_is_the_same_bytes_each_time(causes, tmp_path, same_bytes):
-    predictions, [truth] = write_run(tmp_path, causes)
-    objects = objects_in(tmp_path)
-    same_bytes(
-        lambda: draw_causes_example(
-            objects, truth, predictions, CauseSettings(**FEW_CAUSES), {"right": "Right"}, "Four"
-        )
-    )

@@ -2,7 +2,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gpca.errors import InputError
 from gpca.evaluation.measures import TIDY_COLUMNS
 from gpca.experiments.confusions import MOST, draw_confusions, pooled_confusions
 
@@ -53,12 +52,3 @@ def test_the_first_named_are_drawn_first_and_no_more_than_fit(metrics):
     shown = [panel.get_title().replace("\n", " ") for panel in figure.axes]
     assert len(shown) == MOST
     assert [title.split()[1] for title in shown] == ["5", "2", "0", "1"]
-
-
-def test_the_same_metrics_give_the_same_bytes(metrics, same_bytes):
-    same_bytes(lambda: draw_confusions(metrics, EXPLAINERS, (), "both"))
-
-
-def test_metrics_without_these_confusions_are_refused(metrics):
-    with pytest.raises(InputError, match="are of none of these explainers"):
-        draw_confusions(metrics, {"other": "Other"}, (), "both")

@@ -110,15 +110,6 @@ def test_samples_are_of_one_object_and_of_medium_severity(files):
     assert {bars.object_name[sample] for sample in choose_samples(bars, "registrations.npz").values()} == {"bar"}
 
 
-def test_training_samples_are_not_shown(files):
-    _, registrations, _ = files
-    first = choose_samples(registrations, "registrations.npz")
-    rest = np.array([row for row in range(24) if row not in first.values()])
-    split = np.where(np.isin(np.arange(24), rest), "test", "train")
-    again = choose_samples(replace(registrations, split=split), "registrations.npz")
-    assert not set(first.values()) & set(again.values())
-
-
 def test_an_object_without_all_concepts_is_refused(files):
     _, registrations, _ = files
     with pytest.raises(InputError, match=r"r\.npz.*any object"):
@@ -207,8 +198,3 @@ def test_no_letter_is_smaller_than_7_pt_and_none_leaves_the_figure(stage_files):
     figure = overview(stage_files)
     assert len(words_of(figure)) > 15
     assert_words_are_large_enough_and_inside(figure)
-
-
-def test_a_concept_without_treatment_is_refused(stage_files):
-    with pytest.raises(InputError, match=r"recovery\.treatments: has no action for 'pose'"):
-        overview(stage_files, {"noise": "denoise"})

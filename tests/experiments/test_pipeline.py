@@ -10,7 +10,6 @@ from gpca.active_learning.curves import POOL_COLUMNS, write_curves
 from gpca.active_learning.rounds import initial_gpc, make_task, rounds
 from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.declarations.plan import Run
-from gpca.errors import InputError
 from gpca.experiments.pipeline import fig4_pipeline, first_round
 from gpca.experiments.registration_stages import Staged, severity_text
 from tests.figures import assert_words_are_large_enough_and_inside, words_of
@@ -105,9 +104,3 @@ def test_letters_are_large_enough_inside_and_apart(stage_files, curve_files):
     for label, last in (("BALD + $k$-means", 62.5), ("random", 56.5)):
         np.testing.assert_allclose(lines[label].get_ydata()[-1], last)
     assert "entropy" not in lines
-
-
-def test_curves_of_other_strategies_alone_are_refused(stage_files, curve_files):
-    others = [path for path in curve_files if "entropy" in str(path)]
-    with pytest.raises(InputError, match=r"active learning: has no curve of bald_kmeans or random; run"):
-        pipeline(stage_files, others)

@@ -6,7 +6,6 @@ import pytest
 
 from gpca.config.check import check
 from gpca.config.layers import without_false
-from gpca.encoders.registry import make_encoder
 from gpca.errors import InputError
 from gpca.experiments.frames import pretraining_of
 from gpca.experiments.run import explainer_of, files_behind, names_of
@@ -32,11 +31,6 @@ def test_the_full_protocol_has_them_with_every_reduction_and_the_default_has_non
         assert pretraining_of(config["real_world"], name)["epochs"] == epochs
     assert usual["published"] == [] and usual["condition_backbone"] == ["dgcnn-none"]
     assert not {"frame_encoder", "frame_start"} & set(usual["reading_group"])
-
-
-def test_it_has_the_published_size():
-    encoder = load("full")["encoders"]["dgcnn_1024"]
-    assert make_encoder(encoder["backbone"], encoder["options"]).embedding_size == 2048
 
 
 @pytest.mark.parametrize(

@@ -173,13 +173,6 @@ def test_clusters_are_the_tables_of_each_seed(shares):
     assert (row["value"], row["low"], row["high"]) == pytest.approx((1, *wilson_interval(6, 6)))
 
 
-def test_the_same_files_give_the_same_bytes_and_none_are_a_fault(taken_files, shares, tmp_path):
-    write_csv(tmp_path / "again.csv", collect_intervals(run_of(budget=2), taken_files), form=None)
-    assert (tmp_path / "again.csv").read_bytes() == (tmp_path / "intervals.csv").read_bytes()
-    with pytest.raises(InputError, match="recovery: no files were given"):
-        collect_intervals(run_of(), [])
-
-
 SOLVED = {  # policy -> of four failures, after how many actions each is recovered; 0 never
     "gpca_acting": (1, 1, 1, 2),
     "gpca_gated": (1, 1, 0, 0),

@@ -13,10 +13,7 @@ from gpca.experiments import registration_methods
 from gpca.experiments.registration_methods import (
     collect,
     read_seconds,
-    read_trials,
-    row_name,
     share_of_milder,
-    table11_limits,
     table11_registration,
     table11_severity,
 )
@@ -132,12 +129,6 @@ def test_a_lead_is_paired_and_over_the_best_other_method_of_the_same_start(writt
     assert leads.loc["fgr+gicp", "all"]["other"].startswith("fgr+")
 
 
-def test_a_global_method_has_one_row_of_its_name(written, object_files):
-    metrics, _ = collect(of_run(), [written(two_starts(("none",)), "fgr")], object_files)
-    assert set(metrics["method"]) == {"fgr"}
-    assert [row_name("gicp", start) for start in ("initial", "none", "teaser")] == ["gicp", "gicp", "teaser+gicp"]
-
-
 def test_thirds_of_the_drawn_severities_have_a_third_of_the_draws_each():
     random, draws = np.random.default_rng(0), 30_000
     rows = pd.DataFrame(
@@ -164,14 +155,6 @@ def test_seconds_are_means_of_each_start(tmp_path):
     assert value(seconds, method="fgr+gicp", metric="seconds", seed=3, source="ycb", concept="all") == 4
     with pytest.raises(InputError, match="no files were given"):
         read_seconds([])
-
-
-def test_the_file_is_read_as_it_was_written(written):
-    rows = read_trials(written(two_starts()))
-    assert rows["add_relative"].tolist() == two_starts()["add_relative"].tolist()
-    assert set(rows["failure"]) == {"", "lost, alas"}
-    names = list(SEVERITY_COLUMNS)
-    assert rows[names].to_numpy() == pytest.approx(two_starts()[names].to_numpy(), abs=1e-6)
 
 
 def test_intervals_are_of_the_same_measures_over_all_pairs(files, object_files, tmp_path):
@@ -271,12 +254,6 @@ def test_causes_and_severities_have_columns_and_their_pairs_are_counted(interval
     assert (0, "noise_low") in table.cells and (0, "noise_middle") not in table.cells
     assert "Pairs of all seeds, by column: 40, 0, 40, 40, 0, 40, 40, 0, 40." in table.markdown()
     assert "Over 3 seeds, 40 test samples each" in table.markdown()  # of all causes together
-
-
-def test_allowing_larger_errors_has_a_column_each(intervals):
-    table = table11_limits(of_run(methods=METHODS, success={"error": 0.03, "curve": [0.05, 0.1]}), intervals)
-    assert list(table.columns) == ["success_5", "success_10"]
-    assert table.cells[0, "success_10"].mean == pytest.approx(90) and (0, "success_5") not in table.cells
 
 
 def test_methods_left_out_and_stand_ins_are_named(intervals, seconds, monkeypatch):

@@ -136,12 +136,6 @@ def test_recalls_are_by_overlap_rung_and_list(intervals):
     assert value(intervals, method="gicp", metric="failed", concept="all")["value"] == pytest.approx(0.5)
 
 
-def test_without_a_correspondence_there_is_no_success(files):
-    write_csv(files[1], trials(("none",)).assign(fitness=0.0))
-    found = collect(run_of(), files[1:])
-    assert set(found[found["metric"] != "failed"]["value"]) == {0}
-
-
 def test_faults_of_trials_are_one_line(files):
     with pytest.raises(InputError, match="no files were given"):
         collect(run_of(), [])

@@ -34,13 +34,6 @@ def test_a_row_says_where_the_number_lies_and_which_reading_is_nearest():
     assert "between" in text
 
 
-def test_numbers_on_stand_ins_are_shown_as_such_and_reproduced_ones_are_not():
-    stand_in = Run(DEFAULTS | {"sources": {"ycb": {"title": "YCB", "stand_in": True}}})
-    assert "procedural stand-in" in table13_readings(stand_in, rows("not comparable")).markdown()
-    with pytest.raises(InputError, match="has nothing to show"):
-        table13_readings(RUN, rows("reproduced"))
-
-
 def test_each_number_is_a_dot_at_its_share_of_close_readings(same_bytes):
     many = pd.concat([rows().assign(row=f"kernel {i}") for i in range(8)], ignore_index=True)
     [panel] = draw_readings(RUN, many).axes

@@ -92,17 +92,6 @@ def test_intervals_are_of_the_same_shares_over_families_of_all_sources(path, tmp
     assert (intervals["low"] < intervals["high"]).all()
 
 
-def test_agreement_is_with_the_same_sample_of_the_same_source_and_seed(path, tmp_path):
-    other = tmp_path / "exchange/cups/seed4.csv"
-    other.parent.mkdir()
-    rows = pd.read_csv(path, keep_default_na=False)
-    rows.loc[rows["asked_of"] == "censi", "concept_predicted"] = "pose"  # as with Monte-Carlo
-    rows.loc[rows["asked_of"] == "censi", "abstained"] = False
-    rows.to_csv(other, index=False)
-    _, intervals = collect(RUN, [path, other])
-    assert intervals.set_index(["method", "metric"])["value"]["censi", "agreement"] == 0.5
-
-
 @pytest.fixture
 def intervals():
     rows = []

@@ -40,9 +40,3 @@ def test_factors_and_lower_bounds_have_signs():
         row | {"difference": float("nan")},
     ]
     assert [verdict_map._words(each) for each in shown] == ["-2.0", "÷4.0", ">×31", ""]
-
-
-def test_a_run_of_stand_ins_has_cells_without_verdicts(comparison):
-    figure = verdict_map.verdicts(RUN, comparison.assign(verdict="not comparable", reason="", difference=float("nan")))
-    assert "93 not comparable" in words_of(figure)
-    assert "0 of 93 printed means are decided" in words_of(figure)

@@ -235,11 +235,6 @@ def test_a_folder_that_is_no_dataset(damaged, name):
     refusal(instances(), damaged.parent, words, ";")
 
 
-@pytest.mark.parametrize("location", ["nowhere", "tiny/models/models_info.json", "tiny/models"])
-def test_a_location_without_scenes(damaged, location):
-    refusal(instances(scenes=location), damaged.parent, f"{location}: has no test*/<scene>/scene_gt.json")
-
-
 def test_what_a_real_dataset_may_have_is_no_fault(scenes, tmp_path):
     shutil.copytree(scenes, tmp_path / "tiny")
     expected, _ = read(scenes, tmp_path / "objects.npz")

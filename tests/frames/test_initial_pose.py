@@ -266,18 +266,6 @@ def test_a_results_file_that_cannot_be(call, damaged, part, name):
     refusal(call(**{part: spoilt}), damaged.parent, "results.csv", words, ";")
 
 
-def test_a_folder_in_place_of_results(call, damaged):
-    arguments = call()
-    (damaged.parent / "results.csv").unlink()
-    (damaged.parent / "results.csv").mkdir()
-    refusal(arguments, damaged.parent, "results.csv: no such results file")
-
-
-def test_no_results_where_poses_come_from_them(damaged):
-    given = {"initial_pose": {"form": "results"}, "datasets": {"tiny": {"location": str(damaged)}}}
-    refusal(instances(given, scenes=None), damaged.parent, "dataset tiny: has no results file; set results")
-
-
 def test_good_results_are_read(call, damaged, lines, capsys):
     from gpca.frames.instances import Instances
 

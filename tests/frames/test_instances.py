@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from gpca.errors import InputError
-from gpca.frames.dataset import datasets_of, simplified
+from gpca.frames.dataset import simplified
 from gpca.frames.instances import Instances, require_of_objects
 from gpca.io.arrays import save_arrays
 from gpca.objects.surface import Surface
@@ -100,9 +100,3 @@ def test_a_scan_is_simplified_and_keeps_its_size():
 def test_a_camera_sees_no_cloud_of_points():
     with pytest.raises(InputError, match="object 'cup': is a point cloud, but the virtual camera needs a mesh"):
         simplified(Surface("cup", np.zeros((70, 3)), None))
-
-
-def test_of_rendered_scenes_every_frame_is_read(scenes, tmp_path):
-    (rendered,) = datasets_of(None, None, tmp_path, scenes).values()
-    assert rendered.most_frames is None
-    assert len(rendered.frames()) == 6

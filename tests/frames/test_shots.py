@@ -114,13 +114,6 @@ def test_surface_behind_something_measured_is_not_held_against_a_pose():
     assert 0.2 < behind < 0.8
 
 
-def test_a_camera_of_its_own_size_is_used():
-    camera = Camera(40, 30, 40)
-    shot = seen((0.6, 0, 0.2), camera=camera)
-    assert shot.mask.shape == (30, 40)
-    assert np.linalg.norm(shot.object_points_m(2 * D), axis=1) == pytest.approx(0.1, abs=6e-3)
-
-
 CAMERA = Camera(192, 144, 180)
 CENTRE = np.array([0.1, -0.05, 0.06])
 

@@ -26,12 +26,6 @@ def drawn(shelf):
     return {cause: [situations.draw(cause, cause, n) for n in range(3)] for cause in CONCEPTS}
 
 
-def test_the_shelf_knows_what_its_objects_are(shelf):
-    known = dict(zip(shelf.objects.names, shelf.symmetric, strict=True))
-    assert known == {"brick": True, "cylinder": True, "cone": True, "capsule": True, "bracket": False}
-    assert shelf.objects.diameters_m[0] == pytest.approx(np.linalg.norm((0.06, 0.09, 0.14)))
-
-
 def test_a_situation_differs_from_the_one_without_the_cause_by_the_cause_alone(drawn):
     for noisy, clean in drawn["noise"]:
         low, high = SETTINGS.noise_scale

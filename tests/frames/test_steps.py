@@ -56,12 +56,6 @@ def test_a_dataset_becomes_registrations(read, capsys):
     assert (folder / "poses.csv.provenance.json").is_file()
 
 
-def test_the_scenes_of_another_step_stand_in_for_datasets(scenes, read):
-    status, folder = read("--scenes", str(scenes), given={"initial_pose": {"form": "true_pose"}})
-    assert status == 0
-    assert set(Instances.load(folder / "instances.npz").dataset) == {"scenes"}
-
-
 def test_scenes_are_drawn_by_a_command(tmp_path, monkeypatch):
     from gpca.objects import procedural
 

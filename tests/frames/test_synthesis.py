@@ -113,14 +113,6 @@ def test_an_occluder_covers_the_share_in_one_piece(tiny, share):
     assert count < 5
 
 
-def test_another_draw_is_another_occluder_and_the_same_draw_the_same(tiny):
-    instances, _ = tiny
-    pixels = instances.pixels_of(0)
-    draws = [occlude(instances, 0, pixels, 0.4, np.random.default_rng(seed)) for seed in (1, 1, 2)]
-    assert np.array_equal(draws[0], draws[1])
-    assert not np.array_equal(draws[0], draws[2])
-
-
 def test_without_another_object_nothing_can_stand_in_front(tiny):
     instances, _ = tiny
     alone = replace(instances, object_index=np.zeros(len(instances), int))

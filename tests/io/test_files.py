@@ -139,10 +139,3 @@ def test_a_name_that_leads_to_no_file_is_one_line(folder, name):
     (folder / "loop").symlink_to("loop")
     with pytest.raises(InputError, match="cannot be read"):
         require_file(folder / name, "no such file", "make it")
-
-
-def test_sizes_are_in_the_unit_that_fits(folder):
-    (folder / "a").write_bytes(bytes(2_000_000))
-    for limit, words in ((1_500_000, "is 2 MB, more than the limit of 1.5 MB"), (100_000, "of 0.1 MB")):
-        with pytest.raises(InputError, match=words):
-            require_file(folder / "a", "no such file", "make it", limit)

@@ -138,12 +138,6 @@ def test_the_provenance_of_a_scripts_outputs_names_data_and_parameters_but_not_c
     assert record["settings"] == {"title": "A title"}
 
 
-def test_another_error_of_a_script_keeps_its_traceback(tmp_path):
-    status, log = run_script(tmp_path, "1 / 0")
-    assert status == 1
-    assert "ZeroDivisionError" in log
-
-
 ASCII = {"PYTHONIOENCODING": "ascii"}
 C_LOCALE = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
 HELP = [sys.executable, "-m", "gpca", "--help"]

@@ -11,7 +11,7 @@ from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.explainers.classifiers import BoostedQuestion
 from gpca.explainers.pair_classifier import Judgment, PairClassifier
-from gpca.model.diagnoser import Diagnoser, TrainingSet, judged_unseen, learn, threshold_of
+from gpca.model.diagnoser import Diagnoser, TrainingSet, judged_unseen, learn
 from gpca.model.diagnosis import Diagnosis, Reenacted, state_probabilities
 from gpca.model.file import FEATURE_COUNT
 from gpca.reenactment.dataset import FEATURES, Reenactments, reenactment_features
@@ -143,13 +143,6 @@ def test_training_sets_are_those_of_the_truth(causes):
     np.testing.assert_array_equal(found.features_N_F, reenactment_features(own))
     both = TrainingSet.joined([found, found.subset(np.arange(2))])
     assert len(both.label_N) == n + 2
-
-
-@pytest.mark.parametrize("share", [0.0, 0.05, 0.5])
-def test_at_most_the_share_of_nominal_samples_reaches_the_threshold(share):
-    failure_N = np.random.default_rng(1).uniform(size=200)
-    threshold = threshold_of(failure_N, share)
-    assert (failure_N >= threshold).mean() <= share < (failure_N >= threshold).mean() + 1 / 200
 
 
 @pytest.fixture(scope="module")

@@ -2,12 +2,11 @@
 
 import subprocess
 import sys
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from gpca import CanonicalFrame, Explainer
+from gpca import CanonicalFrame
 from gpca.alignment.icp import ICP, ICPSettings
 from gpca.alignment.methods.interface import Pair
 from gpca.alignment.methods.registry import make_method
@@ -176,13 +175,6 @@ def test_the_package_offers_the_explainer_without_loading_it():
         from gpca import Nothing  # noqa: F401
 
 
-@pytest.mark.parametrize("method", ["point_to_plane", "generalized"])
-def test_other_kinds_of_icp_estimate_the_normals(model, pair, method):
-    source, target = pair
-    explanation = Explainer(replace(model, icp=ICPSettings(method=method)), device="cpu").explain(source, target)
-    assert explanation.fitness > 0
-
-
 def test_a_method_finds_the_pose_and_the_scores_are_those_at_it(explainer, model, pair):
     source, target = pair
     frame = CanonicalFrame.of(target)
@@ -234,10 +226,3 @@ def test_an_estimator_says_how_uncertain_the_pose_of_a_method_is(explainer, pair
     assert "(root mean square by brossard)" in explanation.text()
     assert explanation.as_dict()["spread"]["estimator"] == "brossard"
     assert explanation.as_dict()["spread"]["starts"] is None
-
-
-def test_an_estimator_that_cannot_tell_leaves_a_note(explainer, pair):
-    asked = {"uncertainty": UncertaintySettings(icp_points=64), "estimator": "bonnabel"}
-    explanation = explainer.explain(*pair, **asked)
-    assert explanation.spread is None
-    assert [note for note in explanation.notes if note.startswith("bonnabel gives no covariance: the Hessian is no")]

@@ -117,12 +117,6 @@ def test_the_repaired_or_a_likelier_pose_is_drawn_beside_the_result(explained):
         assert replace(scene, T_found=T_found).packed("m").get("beside") == beside
 
 
-def test_a_fast_or_undiagnosed_one_has_its_page(explainer, pair):
-    assert "Nothing: a fast explanation" in explainer.explain(*pair, fast=True).html()
-    alone = explainer.explain(*pair, diagnose=False)
-    assert f"The leading concept is {alone.concept}" in alone.html()
-
-
 def test_an_explanation_and_its_scene_are_in_one_frame(explained, pair):
     source, _ = pair
     aligned = transform(explained.T_target_source, source)

@@ -278,14 +278,6 @@ def test_a_scan_of_80_m_is_read_from_every_format(tmp_path, suffix):
     np.testing.assert_allclose(read_points(path), WIDE, atol=1e-5)
 
 
-def test_points_are_drawn_on_a_mesh_of_any_size(tmp_path):
-    box = trimesh.creation.box((30, 40, 120)).apply_translation((500, 0, 0))
-    box.export(tmp_path / "box.stl")
-    points = read_points(tmp_path / "box.stl")
-    np.testing.assert_allclose([points.min(axis=0), points.max(axis=0)], box.bounds, atol=0.05)
-    assert voxel_size({"box": points}, "m") < 5
-
-
 def test_voxels_are_chosen_by_the_spacing_and_leave_few(scans):
     clouds = {"source": scans[0], "target": scans[1]}
     edge = voxel_size(clouds, "m")

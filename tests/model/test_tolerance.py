@@ -3,7 +3,7 @@ import pytest
 
 from gpca.alignment.pose_error import PoseErrors
 from gpca.errors import InputError
-from gpca.model.tolerance import DEFAULT, Tolerance
+from gpca.model.tolerance import Tolerance
 from gpca.rigid import exp
 
 BALL = np.random.default_rng(0).normal(size=(4000, 3))
@@ -36,8 +36,3 @@ def test_what_is_no_tolerance_is_refused_with_examples(text):
 def test_a_tolerance_of_more_than_half_the_target_is_refused(text):
     with pytest.raises(InputError, match="diameters of the target; give at most half of the diameter, 200 mm"):
         Tolerance.parse(text).length(BALL, 200.0, "mm")
-
-
-def test_it_is_written_as_it_is_read():
-    for tolerance in (DEFAULT, Tolerance(5, "mm"), Tolerance(2, "deg")):
-        assert Tolerance.parse(str(tolerance)) == tolerance

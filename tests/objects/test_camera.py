@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from gpca.objects.camera import NOTHING, Camera, DepthNoise, MeshScene, View, back_project, look_at, shade
+from gpca.objects.camera import NOTHING, Camera, DepthNoise, MeshScene, back_project, look_at
 from gpca.rigid import inverse, transform
 
 CAMERA = Camera(width=80, height=60, focal_px=70)
@@ -74,12 +74,3 @@ def test_steep_surfaces_and_the_declared_share_drop_out():
     flat = MeshScene([WALL]).look(CAMERA, from_above(0.8))
     lost = DepthNoise(dropout=0.2).measure(flat, np.random.default_rng(0)) == 0
     assert lost.mean() == pytest.approx(0.2, abs=0.03)
-
-
-def test_what_faces_the_lamp_is_brighter():
-    T_world_camera = from_above(0.8)
-    view = MeshScene([WALL]).look(CAMERA, T_world_camera)
-    away = View(view.depth_m, view.mesh, view.cosine, -view.normals)
-    lit, unlit = (shade(seen, np.array([[0.8, 0.4, 0.2]]), T_world_camera)[30, 40] for seen in (view, away))
-    assert (lit > unlit).all()
-    assert lit[0] > lit[1] > lit[2]

@@ -103,11 +103,6 @@ def test_diameter_agrees_with_all_pairs(flat):
     assert diameter(points, "x") == pytest.approx(np.linalg.norm(points[:, None] - points[None], axis=2).max())
 
 
-def test_diameter_of_a_fine_sphere():
-    sphere = trimesh.creation.icosphere(subdivisions=4, radius=0.05)  # 2562 vertices, all on the hull: two blocks
-    assert diameter(np.asarray(sphere.vertices), "x") == pytest.approx(0.1)
-
-
 def scaled(factor):
     surface = box(shift=(0, 0, 0))
     return Surface("part", surface.vertices_m * factor, surface.faces)

@@ -11,7 +11,7 @@ import pytest
 import trimesh
 
 from gpca.errors import InputError
-from gpca.objects.entry import stand_in_clause, title_of
+from gpca.objects.entry import stand_in_clause
 from gpca.objects.source import data_files, data_folders, resolve, surfaces
 from tests.objects.test_point_files import ascii_pcd
 
@@ -101,11 +101,6 @@ def test_faults_of_an_entry(fault, tmp_path):
         resolve(entry, str(tmp_path))
 
 
-def test_missing_data_dir(tmp_path):
-    with pytest.raises(InputError, match=f"{tmp_path}/none: no such folder"):
-        resolve(BOP, str(tmp_path / "none"))
-
-
 def test_resolving_is_light():
     code = (
         "import sys; from gpca.objects.source import resolve;"
@@ -168,11 +163,6 @@ def test_a_step_is_told_the_one_folder_that_the_data_of_a_source_comes_from():
 
 REAL = {"title": "YCB", "stand_in": False}
 STAND_IN = {"title": "YCB", "stand_in": True}
-
-
-def test_only_a_stand_in_is_called_one():
-    assert title_of(REAL) == "YCB"
-    assert title_of(STAND_IN) == "YCB (procedural stand-in)"
 
 
 def test_a_caption_tells_stand_ins_from_a_mixture():

@@ -6,7 +6,6 @@ from urllib.parse import urlparse
 
 import pytest
 
-from gpca.errors import InputError
 from gpca.jobs.provenance import record_provenance
 from gpca.page.crate import NAME, write_crate
 
@@ -92,8 +91,3 @@ def test_the_same_run_is_described_by_the_same_bytes(folder):
     assert b"index.html" not in first
     crate_of(folder)
     assert (folder / NAME).read_bytes() == first
-
-
-def test_a_folder_without_records_is_refused(tmp_path):
-    with pytest.raises(InputError, match=r"has no \*\.provenance\.json"):
-        write_crate(tmp_path, "tiny", [], [])

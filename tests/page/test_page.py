@@ -2,7 +2,6 @@
 
 import json
 import re
-from dataclasses import replace
 
 import pytest
 
@@ -127,13 +126,6 @@ def test_pages_of_the_docs_are_links_where_they_are(copied):
     assert '<a href="metrics.csv">metrics.csv</a>' in text
     assert '<a href="#table4_mine">table4_mine</a> and reliability.' in text
     assert [link for link in Page(text).links if link.startswith("..") and not (folder / link).is_file()] == []
-
-
-def test_a_title_says_the_dataset_as_readers_do(copied):
-    folder, run = copied
-    own = replace(run.results[0], title="Objects: cones")
-    write_page(folder, replace(run, results=[own, *run.results[1:]]))
-    assert "<h3>Objects: Cones</h3>" in (folder / "index.html").read_text()
 
 
 def test_without_comparison_and_samples_there_is_no_word_of_them(copied):

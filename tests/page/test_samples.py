@@ -16,7 +16,6 @@ from gpca.page.samples import (
     first_of_each_cause,
     first_of_each_concept,
     page_samples,
-    severity_words,
 )
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.rigid import inverse, transform
@@ -82,13 +81,6 @@ def test_the_clouds_are_those_of_the_file_in_all_three_poses(samples, registrati
         assert (scene["reach"], scene["titles"]) == (REACH, {"pose:0": "In the true pose"})
 
 
-def test_a_large_cloud_is_thinned_evenly(registrations, predicted, tmp_path):
-    many = np.repeat(registrations.points, 20, axis=0)
-    large = replace(registrations, points=many, offsets=registrations.offsets * 20)
-    for sample in page_samples(predicted(large, tmp_path), SOURCE, LIMITS, REACH):
-        assert len(unpacked(sample["scene"]["source"])) == POINTS
-
-
 def test_scores_and_deviations_are_those_of_the_predictions(samples, files):
     rows = pd.read_csv(files["predictions"])
     rows = rows[rows["split"] == "test"].set_index("sample")
@@ -112,13 +104,6 @@ def test_an_abstention_has_no_scores_and_predictions_of_other_samples_are_refuse
     rows[rows["split"] == "train"].to_csv(files["predictions"], index=False)
     with pytest.raises(InputError, match=r"seed0\.csv: lacks test sample \d+ of .*; regenerate both"):
         page_samples(files, SOURCE, LIMITS, REACH)
-
-
-def test_the_words_say_what_was_done(registrations):
-    words = {registrations.concept[row]: severity_words(registrations, row) for row in range(len(registrations))}
-    assert words["noise"].startswith("σ = ")
-    assert words["pose"].startswith("turned by ")
-    assert words["overlap"].endswith(" % of the points cut off")
 
 
 def test_the_page_says_how_far_off_icp_ends(samples, registrations):

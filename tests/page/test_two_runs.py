@@ -8,7 +8,6 @@ import pytest
 
 from gpca.__main__ import main
 from gpca.comparison.verdicts import COMPARISON_COLUMNS
-from gpca.errors import InputError
 from gpca.page.two_runs import compare_tables, read_number, read_printed_table
 from gpca.reporting.tables.table import Cell, Column, Table
 from tests.accessible import faults_of
@@ -94,14 +93,6 @@ def test_a_folder_without_tables_is_refused(two_runs, tmp_path, capsys):
     assert "has no tables/*.md" in capsys.readouterr().err
     assert main(["compare", str(two_runs[0]), str(tmp_path / "none")]) == 2
     assert "none: no such folder" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("text", ["", "| a | b |\n", "| a | b |\n| :-- | --: |\n| 1 |\n"])
-def test_a_damaged_table_is_named(text, tmp_path):
-    path = tmp_path / "mine.md"
-    path.write_text(text)
-    with pytest.raises(InputError, match=r"mine\.md: (holds no table|is empty)"):
-        read_printed_table(path)
 
 
 @pytest.mark.parametrize(

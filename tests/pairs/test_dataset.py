@@ -36,13 +36,6 @@ def test_a_sample_does_not_depend_on_how_many_there_are(objects, registrations):
             assert np.array_equal(getattr(one, name), getattr(other, name)), name
 
 
-@pytest.mark.parametrize(("source", "seed"), [("tiny", 1), ("other", 0)])
-def test_another_seed_or_source_gives_other_samples(objects, registrations, source, seed):
-    other, _ = make_registrations(objects, source, seed, RegistrationSettings(train=3, test=3, cloud_points=256))
-    drawn = np.concatenate([getattr(other, name) for name in ("severity_noise", "severity_crop")])
-    assert not set(drawn[drawn > 0]) & {*registrations.severity_noise, *registrations.severity_crop}
-
-
 def test_severities_are_recorded_for_the_concept_alone(registrations):
     for name, concept in {"noise": "noise", "rotation_rad": "pose", "translation": "pose", "crop": "overlap"}.items():
         assert np.array_equal(getattr(registrations, f"severity_{name}") > 0, registrations.concept == concept)
@@ -115,16 +108,6 @@ def test_without_labels_nothing_tells_the_perturbation(registrations):
             assert np.isnan(getattr(blind, name)).all()
     for name in ("points", "offsets", "T_target_source_icp", "fitness", "sample"):
         assert np.array_equal(getattr(blind, name), getattr(registrations, name))
-
-
-def test_settings_come_from_the_config():
-    config = {"train": 9, "severities": {"noise": [0.1, 0.2]}, "icp": {"method": "point_to_plane"}}
-    settings = RegistrationSettings.from_dict(config)
-    assert (settings.train, settings.test, settings.severities.noise) == (9, 200, (0.1, 0.2))
-    assert settings.icp == ICPSettings("point_to_plane")
-    assert set(config) == {"train", "severities", "icp"}
-    with pytest.raises(InputError, match="'icp2': unknown"):
-        RegistrationSettings.from_dict({"icp": {"method": "icp2"}})
 
 
 def test_registrations_survive_the_file(tmp_path, registrations):

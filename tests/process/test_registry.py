@@ -4,7 +4,7 @@ from importlib import invalidate_caches
 import pytest
 
 from gpca.errors import InputError
-from gpca.process.registry import Registry, load
+from gpca.process.registry import Registry
 
 
 @pytest.fixture
@@ -38,7 +38,3 @@ def test_a_file_that_is_new_in_the_folder_is_found(fruits, tmp_path):
 def test_an_unknown_name_is_answered_with_the_known(fruits, ask):
     with pytest.raises(InputError, match="fruit 'pear': unknown; choose one of mango, plum, cherry, apple"):
         getattr(fruits, ask)("pear")
-
-
-def test_what_is_written_as_module_and_name_is_loaded():
-    assert load("gpca.process.registry:load") is load

@@ -7,7 +7,7 @@ import pytest
 
 from gpca.errors import InputError
 from gpca.recovery import actions
-from gpca.recovery.actions import ACTIONS, OBSERVED, Robot, action_of, best_start, observe
+from gpca.recovery.actions import ACTIONS, OBSERVED, Robot, action_of, observe
 from gpca.recovery.episodes import register_after, register_held
 from gpca.rigid import inverse, rotation_angle_rad
 from tests.failures import LOOP
@@ -53,12 +53,6 @@ def test_the_action_of_the_documentation_sees_the_object_from_closer(start):
     away, near = result.holding.shots
     assert away is outcome.holding.shots[0]
     assert near.mask.sum() > 1.5 * away.mask.sum()
-
-
-def test_the_pose_that_explains_the_shots_is_started_from(start):
-    situation, outcome = start
-    robot, true = Robot(situation), situation.T_world_object
-    assert (best_start(outcome.holding, robot, [None, true]).T_world_object_init == true).all()
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,6 @@ import pytest
 
 import gpca.recovery.episodes as module
 from gpca.errors import InputError
-from gpca.recovery.actions import ACTIONS
 from gpca.recovery.settings import LoopSettings
 from gpca.rigid import inverse
 from tests.failures import LOOP
@@ -24,13 +23,6 @@ def test_a_registration_is_that_of_its_row(start):
         assert outcome.error > 0.5 * np.linalg.norm(T_error[:3, 3]) / d - 0.5
     right = replace(held, T_world_object_init=situation.T_world_object)
     assert module.register_held(situation, right, LOOP).error < 0.05
-
-
-def test_an_action_gives_the_same_again(start):
-    situation, outcome = start
-    a, b = (module.register_after(situation, outcome, ACTIONS["new_view"], ("new_view",), LOOP) for _ in range(2))
-    assert (a.record["cloud"] == b.record["cloud"]).all()
-    assert a.error == b.error
 
 
 def test_failures_have_their_cause_and_are_bounded(situations):

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gpca.causes.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
+from gpca.causes.policy import NOTHING, RecoveryPolicy, Thresholds
 from gpca.causes.settings import OBSERVED, CauseSettings
 from gpca.classifier.scores import Attribution
 from gpca.errors import InputError
@@ -111,14 +111,6 @@ def test_an_explainer_sees_each_registration_once_and_no_policy_insists_on_what_
     rows, _, explain = loop(["gpca", "gpca_acting"])
     assert len(explain.asked) == len(set(explain.asked))
     assert rows.loc[rows["policy"] == "gpca_acting", "action"].is_unique  # the stub's scores never fall
-
-
-def test_a_queued_case_ends_there(loop):
-    rows, *_ = loop(["gpca", "gpca_acting"], uncertain=0.05)
-    queued = rows[rows["policy"] == "gpca"]
-    assert queued["action"].tolist() == [QUEUE]
-    assert not queued["recovered"].any()
-    assert (rows.loc[rows["policy"] == "gpca_acting", "action"] != QUEUE).all()
 
 
 def test_about_what_did_not_fail_a_policy_only_decides(loop, start):

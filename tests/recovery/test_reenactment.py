@@ -91,13 +91,6 @@ def test_seen_surface_faces_a_camera_and_grows_with_another_view(start, known):
     assert shares[1] > shares[0]
 
 
-def test_random_numbers_are_named(start, known):
-    holding = start[1].holding
-    first, again, other = (belief_of(holding, known, axes) for axes in (AXES, AXES, ("other", 1)))
-    assert np.array_equal(first.observed, again.observed) and first.failure == again.failure
-    assert not np.array_equal(first.observed, other.observed)
-
-
 CAMERA = Camera(80, 80, 80)
 REACH_M = 0.01
 
@@ -136,10 +129,3 @@ def test_what_stands_in_front_says_nothing(cube):
     appearance = Appearance([shot_of(cube, at(0, 1), hidden_to=40)], cube)
     assert appearance.explained(at(0, 1), REACH_M) == 1
     assert appearance.explained(at(0.2, 1), REACH_M) < 0.8  # there the camera looks through it at the wall
-
-
-def test_all_shots_count(cube):
-    right, wrong = shot_of(cube, at(0, 1)), shot_of(cube, at(0.3, 1))
-    both = Appearance([right, wrong], cube).explained(at(0, 1), REACH_M)
-    alone = (Appearance([shot], cube).explained(at(0, 1), REACH_M) for shot in (right, wrong))
-    assert min(alone) < both < 1

@@ -3,12 +3,7 @@
 import numpy as np
 import pytest
 
-from gpca.classifier.scores import Attribution
-from gpca.pairs.perturbation import CONCEPTS
-from gpca.recovery.answers import LoopExplainers
-from gpca.recovery.chances import FailureGate
-from gpca.recovery.policies import Means
-from gpca.recovery.rehearsal import Rehearsal, robot_policy, summary
+from gpca.recovery.rehearsal import Rehearsal, robot_policy
 
 SECTION = {
     "thresholds": {"uncertain": None, "queued_share": 0.5, "dominant": 0.4, "improvement": 0.3},
@@ -37,16 +32,3 @@ def test_half_of_the_rehearsed_failures_are_above_the_threshold_unless_one_is_de
     declared = SECTION | {"thresholds": SECTION["thresholds"] | {"uncertain": 0.05}}
     assert robot_policy(declared, rehearsal).thresholds.uncertain == 0.05
     assert robot_policy(SECTION, None).thresholds.uncertain == np.inf  # without a rehearsal
-
-
-def test_the_summary_says_how_often_each_explainer_is_right(rehearsal):
-    said = Attribution.of_scores(CONCEPTS, np.tile([0.8, 0.1, 0.1], (30, 1)), seconds=0.0)
-    explainers = LoopExplainers({}, {}, {}, {"gpca": said}, np.array([CONCEPTS[0]] * 15 + [CONCEPTS[1]] * 15))
-    gate = FailureGate(None, 0.75)
-    means = Means(robot_policy(SECTION, rehearsal), ("denoise", "new_view"), None, ("new_view", "denoise"), gate)
-    content = summary(means, explainers)
-    assert content["order"] == ["new_view", "denoise"]
-    assert content["thresholds"]["gate"] == 0.75
-    assert content["calibration_accuracy"] == {"gpca": 0.5}
-    assert content["calibration_samples"] == 30
-    assert content["treatments"] == SECTION["treatments"]

@@ -89,13 +89,6 @@ def test_missing_surface_is_filled_as_densely_as_the_rest(drill, model):
     assert added.mean(axis=0) == pytest.approx(lost.mean(axis=0), abs=0.05)
 
 
-def test_a_clean_cloud_is_not_touched(drill, model):
-    observed = drill[400:900]
-    found = rebuilt_from(observed, np.ones(500), model, np.random.default_rng(0))
-    assert found.applied.tolist() == [False, True, False]
-    assert np.array_equal(found.clean, observed) and np.array_equal(found.noisy, observed)
-
-
 def test_fresh_points_lie_in_the_surface_around_their_rows(model):
     rows = np.arange(10)
     points = fresh_points(model, rows, 50, np.random.default_rng(0))
@@ -131,13 +124,6 @@ def test_what_is_enacted_is_near_the_truth_and_adds_up(drill):
     true = np.array([measured.error(subset) for subset in range(8)])
     assert np.corrcoef(enacted.error_8, true)[0, 1] > 0.8
     assert (enacted.uncertainty_8 >= 0).all() and enacted.uncertainty_8[NONE] == 0
-
-
-def test_the_same_pair_has_the_same_numbers_and_another_sample_other_starts(drill):
-    pair, _ = pair_of(candidate_of(drill, "noise"))
-    first, again = (reenact(pair, SETTINGS, TRUTH)[0].error_8 for _ in range(2))
-    assert np.array_equal(first, again)
-    assert not np.array_equal(first, reenact(replace(pair, axes=("other",)), SETTINGS, TRUTH)[0].error_8)
 
 
 def test_what_finds_no_partner_is_as_wrong_as_can_be(drill):

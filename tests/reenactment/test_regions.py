@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gpca.causes.forms import visible_rows
-from gpca.reenactment.surface import ModelSurface, before_plane, covered_points
+from gpca.reenactment.surface import before_plane, covered_points
 
 
 def wrong(drill, model, hidden, noise, seed=0):
@@ -45,8 +45,3 @@ def test_what_is_cut_off_by_a_plane_remains_so(drill, model, noise):
         by_plane = before_plane(model.points, observed, noise, np.random.default_rng(1))
         found = covered_points(model, observed, noise, np.random.default_rng(1))
         assert (found == by_plane).mean() > 0.85
-
-
-def test_a_few_points_are_a_region_as_well(drill):
-    few = ModelSurface(drill[:64])
-    assert covered_points(few, drill[400:420], 0.05, np.random.default_rng(0)).shape == (64,)

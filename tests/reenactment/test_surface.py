@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from gpca.alignment.pose_error import PoseErrors
-from gpca.reenactment.surface import CORNER, ModelSurface, covered_points, directions
+from gpca.reenactment.surface import CORNER, ModelSurface, covered_points
 from gpca.rigid import exp, transform
 
 
@@ -13,13 +13,6 @@ def test_planes_lie_in_the_surface(drill, model):
     assert np.array_equal(rows, nearest.argmin(axis=0))
     assert np.median(np.abs(residuals)) < 0.5 * np.median(nearest.min(axis=0))
     assert np.abs((model.normals[:, None] * model.tangents).sum(axis=2)).max() < 1e-9
-
-
-def test_spacing_is_that_of_the_points(model):
-    apart = np.linalg.norm(model.points[:, None] - model.points, axis=2)
-    apart = np.sort(apart, axis=1)
-    assert model.spacing == pytest.approx(np.median(apart[:, 1]))
-    assert model.spacing_M == pytest.approx(apart[:, 1:4].mean(axis=1))
 
 
 def test_errors_are_add_where_nothing_is_symmetric(drill, model):
@@ -97,12 +90,6 @@ def test_the_side_that_is_missing_is_the_one_that_was_cut_off(drill, model):
     is_covered = covered(model, seen(drill[400:1200], 0.5, along), 0.0)
     limit = np.median(model.points @ along)
     assert (is_covered == (model.points @ along <= limit)).mean() > 0.9
-
-
-def test_directions_are_unit_vectors_all_around():
-    assert np.linalg.norm(directions(), axis=1) == pytest.approx(1)
-    assert np.abs(directions().mean(axis=0)).max() < 0.01
-    assert np.sort(directions() @ directions().T, axis=1)[:, -2].min() > np.cos(np.deg2rad(20))
 
 
 def test_a_pose_that_differs_in_a_part_alone_is_another_and_its_turn_no_symmetry(can):

@@ -5,7 +5,6 @@ import pytest
 
 from gpca.declarations import registry
 from gpca.declarations.registry import registered, results_of
-from gpca.page.page import rendered_caption
 from gpca.process.registry import load
 from gpca.reporting.registry import Input, Result, build, by_section, targets, unknown_target
 
@@ -35,14 +34,6 @@ def test_every_builder_and_reader_takes_what_its_entry_gives(name):
             inspect.signature(load(each.read)).bind(*[None for key in each.files if not key], **keywords)
         else:
             assert set(each.files) == {""}
-
-
-@pytest.mark.parametrize("name", ENTRIES)
-def test_a_caption_is_whole_text(name):
-    html = str(rendered_caption(name, ENTRIES[name].caption))
-    assert html.startswith("<p>")
-    assert html.rstrip().endswith(".</p>")
-    assert "``" not in html
 
 
 def test_no_name_is_registered_twice_and_the_papers_tables_and_figures_are_marked():

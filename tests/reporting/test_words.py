@@ -1,13 +1,6 @@
 import pytest
 
-from gpca.reporting.words import dataset_in_words, in_words, object_in_words, object_of_frames, plural
-
-
-@pytest.mark.parametrize(
-    ("count", "words"), [(0, "0 seeds"), (1, "1 seed"), ("1", "1 seed"), (2, "2 seeds"), ("1 to 3", "1 to 3 seeds")]
-)
-def test_only_one_has_no_s(count, words):
-    assert plural(count, "seed") == words
+from gpca.reporting.words import dataset_in_words, in_words, object_in_words, object_of_frames
 
 
 @pytest.mark.parametrize(("name", "words"), [("lmo", "LINEMOD-Occlusion"), ("visp", "ViSP"), ("my_own", "my own")])

@@ -99,11 +99,6 @@ def test_a_voxel_has_the_mean_of_its_points():
         voxels(points * 1e13, 0.001)
 
 
-def test_strata_hold_their_lower_edge_and_the_last_its_upper_one():
-    names = [stratum_of(share, EDGES) for share in (0.05, 0.1, 0.29, 0.3, 0.7, 1.0)]
-    assert names == [None, *["overlap_0.1_0.3"] * 2, "overlap_0.3_0.5", *["overlap_0.7_1"] * 2]
-
-
 def test_pairs_are_drawn_stratum_by_stratum_whatever_other_scenes_there_are():
     chosen = choose_pairs([scene(name="a"), scene(name="b")], EDGES, 1, "tiny", 0)
     alone = choose_pairs([scene(name="b")], EDGES, 1, "tiny", 0)

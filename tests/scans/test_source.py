@@ -82,14 +82,6 @@ def test_virtual_scans_of_one_scene_show_one_surface():
     assert 0.1 < compound("object_7", 2).size_m < 0.5
 
 
-def test_virtual_scenes_are_drawn_by_their_names():
-    first, again, other = (compound(name, 2).scans["1"].points_N_3 for name in ("object_0", "object_0", "object_1"))
-    assert (first == again).all() and first.shape != other.shape
-    entry = entry_of(VIRTUAL)
-    names = [next(scenes_of(entry, None, role, 100)).name for role in ("evaluation", "development")]
-    assert names == ["object_0", "object_100"]
-
-
 def test_pairs_are_read_as_they_were_written(tmp_path):
     pairs = [pair(), pair(target="0", source="2"), pair("object", "1", "2")]
     collected = ScanPairs.of(pairs)

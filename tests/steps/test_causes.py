@@ -24,9 +24,3 @@ def test_objects_that_fail_when_clean_are_named_and_the_last_is_a_refusal(folder
     said = [line for line in done.stderr.splitlines() if "%|" not in line]
     assert [line.split("'")[1] for line in said[:-1]] == ["brick", "cone"]
     assert "nearly all clean pairs of every object have an error of at least 0.0001 % of the diameter" in said[-1]
-
-
-def test_one_thread_or_two_give_the_same_bytes(folder, made):
-    assert run_apart(arguments("causes"), folder, threads=2).returncode == 0
-    for name in ("causes.npz", "candidates.csv"):
-        assert (folder / name).read_bytes() == (made / name).read_bytes()

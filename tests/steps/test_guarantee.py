@@ -118,12 +118,6 @@ def test_frames_are_beside_the_test_samples_that_they_are_calibrated_on(scored, 
     assert set(real.weight.tolist()) <= {0.5, 1.0} and set(simulated.weight.tolist()) == {1.0}
 
 
-def test_the_same_files_give_the_same_bytes(files, scored):
-    before = [path.read_bytes() for path in files["scores"]]
-    step.run(Job(settings={"explainers": EXPLAINERS}, **files))
-    assert [path.read_bytes() for path in files["scores"]] == before
-
-
 def test_files_of_other_samples_or_kinds_are_one_line(files):
     of_axes = {"causes_files": files["causes"]} | {name: files[name] for name in ("descriptors", "reenactments")}
     with pytest.raises(InputError, match="array 'distances' is missing"):

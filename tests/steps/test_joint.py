@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 import yaml
 
-from gpca.comparison.joint_reading import CHOICES, numbers_asked, read_choices, read_verdicts
+from gpca.comparison.joint_reading import numbers_asked, read_choices, read_verdicts
 from gpca.comparison.published import read_published
 from gpca.comparison.readings import READING_COLUMNS
 from gpca.declarations.plan import Run
@@ -78,18 +78,6 @@ def hardly_trained(settings, schedule):
     from gpca.classifier.settings import GPCSettings
 
     return GPCSettings(**settings.gpc, kernel=schedule[0], learning_rate=schedule[1], iterations=2)
-
-
-def test_a_reading_of_every_choice_is_found(folder):
-    assert read_choices(folder / "choice.csv")["choice"].tolist() == list(CHOICES)
-    best = pd.read_csv(folder / "best.csv")
-    assert best["share"].is_monotonic_decreasing
-    assert len(best) == 2 * 2 * 2
-    scores = read_metrics(folder / "development.csv").set_index(["table", "metric"])["value"]
-    assert scores["all", "readings"] == 8
-    assert scores["all", "share"] == best["share"].iloc[0]
-    assert 0 < scores["all", "p_column"] <= 1
-    assert {table for table, _ in scores.index} == {"I", "II", "III", "IV", "V", "all"}
 
 
 def test_the_reading_gives_every_number_of_its_source_a_value(folder, monkeypatch):

@@ -55,10 +55,6 @@ def test_retrain_learns_at_once_and_asks_the_same_question_again(label):
     assert "concepts: noise, pose, overlap" in after
 
 
-def test_a_skipped_sample_is_noted_without_a_concept(label):
-    assert label("/skip", "/quit")[1] == [""]
-
-
 def test_a_mistyped_name_is_asked_for_again_on_a_terminal_and_stops_a_file(label):
     status, concepts, said = label("Not a name", "overlap", terminal=True)
     assert (status, concepts) == (0, ["overlap"])

@@ -1,7 +1,5 @@
 """Learning from more and more registrations of four objects."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -59,12 +57,6 @@ def test_further_samples_are_labeled_of_all_objects_and_new(causes, further):
     )
 
 
-def test_a_chunk_is_the_same_whenever_it_is_drawn_and_unlike_others(four, further):
-    again, other = (draw_further(four, "four", 100, CauseSettings(**FEW_CAUSES), chunk, 12) for chunk in (0, 1))
-    assert np.array_equal(again.truth.error, further.truth.error)
-    assert not np.array_equal(other.truth.error, further.truth.error)
-
-
 def test_cheap_descriptors_are_those_of_the_explainers(causes):
     described, _, _ = describe_all(
         causes, "four", 100, DescriptorSettings(starts=1, restarts=1, icp_points=64), ICPSettings()
@@ -88,18 +80,6 @@ def test_more_samples_than_there_are_cannot_be_learned_from(samples, causes):
     assert set(fewer["samples"]) == {0, 20}
     with pytest.raises(InputError, match="are fewer than the least size, 20; raise"):
         learning_curve(pool.subset(np.arange(19)), tested, truth, SETTINGS, "four", 100)
-
-
-def test_samples_survive_the_file(samples, tmp_path):
-    pool, _ = samples
-    pool.save(tmp_path / "chunk0.npz", ("four", 100))
-    read = LabeledSamples.load(tmp_path / "chunk0.npz", ("four", 100))
-    assert np.array_equal(read.features, pool.features) and read.concept.tolist() == pool.concept.tolist()
-    with pytest.raises(InputError, match="of source 'four'"):
-        LabeledSamples.load(tmp_path / "chunk0.npz", ("five", 100))
-    replace(pool, concept=np.full(len(pool), "dust")).save(tmp_path / "chunk0.npz", ("four", 100))
-    with pytest.raises(InputError, match="unknown concept 'dust'"):
-        LabeledSamples.load(tmp_path / "chunk0.npz", ("four", 100))
 
 
 def test_chunks_are_even_and_borderline_samples_have_no_label():

@@ -71,8 +71,3 @@ def test_a_new_concept_is_labeled_but_no_model_file_holds_it(queued, capsys):
 def test_options_that_do_not_go_with_a_queue_are_refused(queued, capsys, more, message):
     assert label([], *more) == 2
     assert message in capsys.readouterr().err
-
-
-def test_without_a_file_explain_says_how_to_queue(queued, capsys):
-    assert main(["explain", "first.npy", "first_target.npy", "--model", "model.pt", "--fast"]) == 0
-    assert "to label it: explain it with --queue queued.npz" in capsys.readouterr().err

@@ -5,9 +5,7 @@ import json
 import pandas as pd
 import pytest
 
-from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.steps import recovery
 from gpca.steps.recovery import as_samples, register_situations
 from tests.failures import LOOP
 from tests.steps.by_words import main
@@ -96,9 +94,3 @@ def test_the_classifier_learns_from_all_causes(situations):
     registrations = as_samples(registered)
     assert registrations.concept.tolist() == list(CONCEPTS) * 3
     assert registrations.split.tolist() == ["train"] * 6 + ["test"] * 3
-
-
-def test_a_camera_that_sees_too_little_is_a_fault(situations, monkeypatch):
-    monkeypatch.setattr(recovery, "register_first", lambda *_: None)
-    with pytest.raises(InputError, match=r"40 views .* fewer than 64 points of them; give recovery.camera more pixels"):
-        register_situations(situations, 1, 0, LOOP)

@@ -1,6 +1,5 @@
 """References: what varies in each, and what does not."""
 
-from dataclasses import replace
 from itertools import islice
 
 import numpy as np
@@ -12,7 +11,6 @@ from gpca.causes.candidate import draw_candidate
 from gpca.causes.settings import CauseSettings
 from gpca.rigid import exp, transform
 from gpca.steps.references import Redraws, draw_twists
-from gpca.uncertainty.estimators.analytic import sample
 from gpca.uncertainty.estimators.interface import RegisteredPair
 
 SETTINGS = CauseSettings(points=(256, 512))
@@ -84,13 +82,6 @@ def test_each_of_sampling_noise_and_outliers_has_numbers_of_its_own(surface):
     assert not np.array_equal(next(noisy.clouds("b"))[0], source_1)
 
 
-def test_the_reference_of_starts_is_monte_carlo_on_the_same_clouds(surface):
-    redraws = redraws_of(surface, True, False, False)
-    registered = registered_of(redraws)
-    expected = sample(registered, 12, "four", 100, "reference")
-    assert np.array_equal(draw_twists("starts", registered, redraws, 12, "four", 100, "reference"), expected)
-
-
 @pytest.mark.parametrize("method", ["point_to_point", "point_to_plane", "trimmed"])
 def test_what_is_determined_hardly_varies_with_the_data(surface, method):
     redraws = redraws_of(surface, False, False, False)
@@ -98,26 +89,3 @@ def test_what_is_determined_hardly_varies_with_the_data(surface, method):
     twists = draw_twists("data", registered, redraws, 10, "a")
     assert len(twists) == 10
     assert np.abs(twists).max() < 0.1
-
-
-def test_all_varies_the_starts_as_well(surface):
-    """Starts from far off end elsewhere, which other data from the same start do not."""
-    redraws = redraws_of(surface, False, False, False)
-    registered = replace(registered_of(redraws), deviation_6=np.full(6, 0.5))
-    kinds = {kind: draw_twists(kind, registered, redraws, 20, "a").std() for kind in ("data", "all")}
-    assert kinds["all"] > 2 * kinds["data"]
-
-
-def test_runs_of_planes_are_those_one_after_the_other(surface):
-    from gpca.alignment.batched_icp import BatchedPlaneICP, register_each_to_planes
-    from gpca.alignment.features import estimate_normals
-    from gpca.steps.references import SETTINGS as ICP
-
-    pairs = list(islice(redraws_of(surface, True, True, False).clouds("a"), 4))
-    icps = [BatchedPlaneICP(target, estimate_normals(target), ICP) for _, target in pairs]
-    starts = np.tile(TURNED, (4, 1, 1))
-    together = register_each_to_planes(icps, [source for source, _ in pairs], starts)
-    for i, (source, _) in enumerate(pairs):
-        alone = icps[i].register(source, starts[i : i + 1])
-        for one, all_ in zip(alone, together, strict=True):
-            assert one[0] == pytest.approx(all_[i], abs=1e-12)

@@ -93,11 +93,6 @@ def test_what_starts_at_a_failure_fails_with_its_reason(registrations, objects, 
     assert (second["fitness"] == 0).all()
 
 
-def test_more_samples_change_nothing_of_the_first(rows, registrations, objects):
-    three = tried(registrations, objects, samples=3)["point_to_point"].drop(columns="seconds")
-    assert three.equals(rows["point_to_point"].drop(columns="seconds").iloc[:6])
-
-
 def test_clouds_are_thinned_and_have_normals(registrations):
     row = registrations.rows("test")[0]
     pair = pair_to_register(registrations, row, "tiny", 100, 70)
@@ -118,11 +113,3 @@ def test_clouds_are_thinned_and_have_normals(registrations):
 def test_methods_that_cannot_run_are_refused(registrations, objects, methods, changes, message):
     with pytest.raises(InputError, match=message):
         tried(registrations, objects, methods, **changes)
-
-
-def test_other_objects_than_those_registered_are_refused(registrations, objects):
-    others = replace(objects, names=("brick", "capsule", "cone"))
-    with pytest.raises(InputError, match="object 1 is not 'cone', as in the registrations"):
-        tried(registrations, others)
-    with pytest.raises(InputError, match="have no test samples"):
-        tried(registrations.subset(registrations.rows("train")), objects)

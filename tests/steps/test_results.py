@@ -8,7 +8,6 @@ from baselines import analytical
 from gpca.attribution.predictions import read_predictions, write_timings
 from gpca.causes.dataset import LABELS
 from gpca.causes.policy import RecoveryPolicy, Thresholds
-from gpca.io.arrays import save_arrays
 from gpca.model.file import Model
 
 from .by_words import main
@@ -27,10 +26,6 @@ def test_seconds_are_in_a_file_of_their_own(made, rows, seconds, columns, count)
     assert "seconds" not in rows[0]
     assert seconds[0] == columns
     assert len(rows) == len(seconds) == 1 + count
-
-
-def test_a_global_method_has_one_trial_without_a_start(made):
-    assert (made / "fgr_trials.csv").read_text().count(",none,") == 3
 
 
 def test_a_diagnosis_scores_nominal_and_the_causes_of_every_sample(made):
@@ -73,24 +68,6 @@ def test_an_explainer_measures_each_registration_once(registrations, tmp_path, m
     changes = {"--explainer": "analytical_gpc", "--embeddings": None, "--input-timings": "icp.csv"}
     assert main(arguments("attribute", changes)) == 0
     assert measured == list(zip(registrations.split, registrations.sample, strict=True))
-
-
-def test_reduced_embeddings_are_of_the_same_samples_and_each_seed_has_its_own(folder):
-    with np.load(folder / "embeddings.npz") as archive:
-        save_arrays(folder / "seed1.npz", dict(archive) | {"seed": np.array(1)})
-    files = {"--embeddings": ["embeddings.npz", "seed1.npz"], "--out": ["reduced.npz", "other.npz"]}
-    assert main(arguments("reduce", files | {"--seeds": [0, 1]})) == 0
-    whole, reduced, other = (np.load(folder / name) for name in ("embeddings.npz", "reduced.npz", "other.npz"))
-    assert reduced["h"].shape == (24, 4)
-    assert reduced["h"].dtype == np.float32
-    for name in ("head_logits", "sample", "split"):
-        assert np.array_equal(reduced[name], whole[name])
-    assert not np.array_equal(other["h"], reduced["h"])
-
-
-def test_unreduced_embeddings_are_those_that_were_given(folder):
-    assert main(arguments("reduce", {"--reduction": "none", "--settings": {}})) == 0
-    assert np.array_equal(np.load(folder / "reduced.npz")["h"], np.load(folder / "embeddings.npz")["h"])
 
 
 def test_the_model_holds_the_policy_of_the_config_with_a_threshold_of_its_own(folder, made):

@@ -4,9 +4,7 @@ import pytest
 from gpca.active_learning.rounds import make_task
 from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.classifier.settings import GPCSettings
-from gpca.errors import InputError
-from gpca.evaluation.runtime_file import COMPONENTS, RUNTIME_COLUMNS, read_runtime
-from gpca.io.csv_file import write_csv
+from gpca.evaluation.runtime_file import COMPONENTS
 from gpca.steps.runtime import measure
 
 
@@ -28,16 +26,3 @@ def test_every_component_is_measured_so_often_and_an_explanation_takes_longer_th
     assert on_cpu["hardware"].str.endswith("cores").all()
     median_s = runtime.drop_duplicates("component").set_index("component")["median_s"]
     assert median_s["explanation"] > median_s["features"]
-
-
-def test_the_file_is_read_as_it_was_written(runtime, tmp_path):
-    write_csv(tmp_path / "runtime.csv", runtime)
-    rows = read_runtime(tmp_path / "runtime.csv")
-    assert tuple(rows.columns) == RUNTIME_COLUMNS
-    np.testing.assert_allclose(rows["mean_s"], runtime["mean_s"], atol=1e-6)
-
-
-def test_a_spoiled_file_is_one_line(runtime, tmp_path):
-    write_csv(tmp_path / "runtime.csv", runtime.astype(object).assign(mean_s="long"))
-    with pytest.raises(InputError, match="column 'mean_s' contains values"):
-        read_runtime(tmp_path / "runtime.csv")

@@ -6,7 +6,6 @@ import shutil
 from dataclasses import replace
 
 import pytest
-import yaml
 
 from gpca.commands import ship
 from gpca.commands.ship import licenses_of
@@ -101,17 +100,6 @@ def test_a_model_is_shipped_without_its_objects_by_their_records(folder):
     assert "| Tiny things | – | diagnosis |" in (folder / "shipped.md").read_text()
 
 
-def places(entry):
-    """Return a file that an entry of the full protocol reads in each of the places that its config names."""
-    named = [f"/data/{entry['location']}/file"]
-    for key in ("results", "errors", "url", "urls"):
-        given = entry.get(key) or []
-        named += [given] if isinstance(given, str) else given
-    return named
-
-
-BOP = yaml.safe_load((ROOT / "config/bop.yaml").read_text())
-ENTRIES = BOP["sources"] | BOP["real_world"]["datasets"]
 SUMS = (ROOT / "data/SHA256SUMS").read_text().splitlines()
 
 
@@ -121,12 +109,6 @@ def test_every_file_of_the_repositorys_data_that_a_run_reads_has_a_license():
     assert len(read) > 100
     for name in read:
         assert licenses_of(f"data/{name}", ROOT), name
-
-
-@pytest.mark.parametrize("name", ENTRIES)
-def test_every_dataset_that_is_downloaded_has_a_license(name):
-    for place in places(ENTRIES[name]):
-        assert licenses_of(place, ROOT), place
 
 
 def provenance(name, inputs=(MESH,), **settings):

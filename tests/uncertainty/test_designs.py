@@ -7,7 +7,7 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.rigid import transform
 from gpca.uncertainty import designs
 from gpca.uncertainty.interventions import MIDDLE, UNTOUCHED, UPPER, PairDraws
-from gpca.uncertainty.settings import CONDITIONS, CORNERS, LATIN, SALTELLI, UncertaintySettings
+from gpca.uncertainty.settings import CORNERS, LATIN, SALTELLI, UncertaintySettings
 
 SETTINGS = UncertaintySettings(starts=13, icp_points=60)
 XI = np.random.default_rng(0).normal(size=(13, 6)) * SETTINGS.deviation_6()
@@ -37,11 +37,6 @@ def test_corner_bits_are_switches():
     assert CORNERS[1] == (True, False, False) and CORNERS[4] == (False, False, True)
     for corner, switches in enumerate(CORNERS):
         assert sum(on << i for i, on in enumerate(switches)) == corner
-
-
-def test_every_design_that_is_named_can_be_run():
-    assert designs.DESIGNS.keys() == CONDITIONS.keys()
-    assert all(len(set(conditions)) == len(conditions) for conditions in CONDITIONS.values())
 
 
 def test_the_names_of_the_corners_are_what_is_switched_on():

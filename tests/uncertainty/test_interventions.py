@@ -75,12 +75,6 @@ def test_a_setting_does_not_depend_on_those_before_it():
     assert len({numbers(each) for each in forth}) == len(settings)
 
 
-def test_starts_without_a_spread_are_one_pose():
-    runs = knob_runs()
-    still = runs(Knobs(0.0, 0.0, 0.0))  # no spread of the starts: one pose in all runs
-    assert still.degenerate and np.allclose(still.covariance, 0, atol=1e-12) and np.isfinite(still.residual)
-
-
 def test_middle_and_upper_ends_are_those_of_the_severities():
     ranges = Severities()
     rotation_over_starts = np.array(ranges.rotation_deg) / SETTINGS.start_rotation_deg

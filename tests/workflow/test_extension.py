@@ -80,21 +80,6 @@ def test_a_folder_of_meshes_and_a_rule_of_an_own_source_become_rows(finished, pl
     assert 0 < means["my_parts"] <= 100
 
 
-def test_a_strategy_and_an_encoder_of_the_docs_are_planned(project):
-    """The config alone: that they run is tested without the workflow, in tests/test_adding.py."""
-    acquisition = project.folder / "gpca/active_learning/acquisition.py"
-    acquisition.write_text(acquisition.read_text() + block("gpca/active_learning/acquisition.py", "bald_dense"))
-    registry = project.folder / "gpca/encoders/registry.py"
-    registry.write_text(registry.read_text() + block("gpca/encoders/registry.py", "pointwise"))
-    (project.folder / "gpca/encoders/pointwise.py").write_text(block("gpca/encoders/pointwise.py"))
-    mine = [block("config/config.yaml", name) for name in ("bald_dense", "pointwise")]
-    (project.folder / "mine.yaml").write_text("".join(mine))
-    planned = project.dry_run("results/smoke/tables/table3_extended.md", *SMOKE, "mine.yaml")
-    assert "results/smoke/active_learning/ycb/bald_dense/seed1.csv" in planned.outputs
-    assert "results/smoke/embeddings/ycb/pointwise/none/seed0.npz" in planned.outputs
-    assert not [path for path in planned.outputs if "dgcnn" in path or "badge" in path]
-
-
 def test_a_table_of_the_docs_is_a_function(finished):
     file = "gpca/experiments/abstentions.py"
     (finished.folder / file).write_text(block(file))
@@ -170,13 +155,3 @@ def test_an_explainer_in_a_file_of_ones_own_becomes_a_row(finished):
     again = finished.dry_run("results/smoke/tables/table1_extended.md", *SMOKE)
     shown = ("metrics", "timings", "attribution_intervals", "table1_extended")
     assert again.jobs == dict.fromkeys(shown, 1) | {"attribute": 2}
-
-
-def test_a_wrong_setting_of_an_own_explainer_stops_at_load(project):
-    (project.folder / "baselines/fitness_only.py").write_text(EXPLAINER)
-    project.append("config/smoke.yaml", "  fitness_only: {sharpnes: 50.0}\n")
-    done = project.plan("all", *SMOKE, check=False)
-    assert done.returncode != 0
-    assert (
-        "gpca: config key explainers.fitness_only: explainer 'fitness_only': setting sharpnes: unknown;" in done.stderr
-    )

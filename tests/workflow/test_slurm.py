@@ -130,12 +130,3 @@ def test_the_queue_sees_compute_alone_and_groups_of_jobs_as_one(cluster, project
     names = ("sample_objects", "register", "encoder", "attribute")
     expected = {"sample_objects": 1, "register": 2, "encoder": 2, "attribute": 1}
     assert Counter(re.match(f"rule_({'|'.join(names)})", name)[1] for name in jobs) == expected
-
-
-@pytest.mark.skipif("GPCA_WHOLE_SLURM" not in os.environ, reason="long: set GPCA_WHOLE_SLURM=1")
-def test_the_whole_run_through_the_queue_has_the_bytes_of_a_local_one(cluster, smoke, project):
-    jobs = submit(project, "all")
-    assert len(jobs) > 80  # of 211 of the workflow: groups are one, and tables and figures are none
-    through_queue, local = project.results(".npz", ".pt", ".csv"), smoke.results(".npz", ".pt", ".csv")
-    assert through_queue.keys() == local.keys()
-    assert [name for name in local if local[name] != through_queue[name]] == []

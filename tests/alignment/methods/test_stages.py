@@ -110,14 +110,6 @@ def test_samples_in_normal_space_are_even_over_directions(monkeypatch):
     assert normals[stages.sample_normal_space(pair)].sum(axis=0).tolist() == [200, 50, 50]  # all there are
 
 
-def test_samples_are_drawn_by_the_seed_of_the_pair(objects):
-    pair, _ = small_motion(objects)
-    other = Pair(pair.source, pair.target, source_normals=pair.source_normals, seed=1)
-    for sample in (stages.sample_at_random, stages.sample_normal_space):
-        assert np.array_equal(sample(pair), sample(pair))
-        assert not np.array_equal(sample(pair), sample(other))
-
-
 def test_rejections_keep_what_they_say_and_weights_fall_with_distance_and_angle(objects):
     pair, _ = perturbed(objects, 0, "noise")
     matches = Stages(distance=0.1).match(pair, np.eye(4))

@@ -92,14 +92,6 @@ def test_none_of_all_subsets_is_a_larger_clique(density, seed):
     assert is_clique(adjacent, clique) and np.array_equal(clique, np.unique(clique))
 
 
-def test_a_hidden_clique_is_found():
-    adjacent = graph(400, 0.15, 0)
-    hidden = np.sort(np.random.default_rng(1).choice(400, 30, replace=False))
-    adjacent[np.ix_(hidden, hidden)] = True  # the diagonal with it, which does not matter
-    clique, certain = largest_clique(adjacent)
-    assert certain and set(hidden) <= set(clique)
-
-
 def test_a_search_that_is_cut_short_says_so_and_gives_a_clique():
     adjacent = graph(120, 0.9, 0)
     clique, certain = largest_clique(adjacent, most_branches=200)

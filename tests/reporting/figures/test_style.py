@@ -5,7 +5,6 @@ import matplotlib
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
-from PIL import Image
 
 from gpca.process.code_files import code_files
 from gpca.reporting.figures import style
@@ -48,22 +47,6 @@ def test_letters_are_truetype_and_nothing_is_dated(figure, tmp_path):
     assert b"/Type3" not in pdf
     assert b"Date" not in pdf and b"Matplotlib" not in pdf
     assert b"Software" not in png and b"tIME" not in png
-
-
-@pytest.mark.parametrize(("photograph", "mode"), [(False, "P"), (True, "RGB")])
-def test_a_drawing_has_few_colors_and_keeps_them(figure, tmp_path, photograph, mode):
-    if photograph:
-        figure.axes[0].imshow(np.random.default_rng(0).random((64, 64, 3)), interpolation="none", extent=(0, 8, 0, 1))
-    figure.axes[0].bar(np.arange(8), 1, color=style.PALETTE)
-    for name in ("a.png", "again.png"):
-        style.save_png(figure, tmp_path / name)
-    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "again.png").read_bytes()
-    image = Image.open(tmp_path / "a.png")
-    assert image.mode == mode
-    assert round(image.info["dpi"][0]) == 300
-    shown = np.asarray(image.convert("RGB")) / 255
-    for color in style.PALETTE:
-        assert np.abs(shown - to_rgb(color)).max(2).min() < 0.05
 
 
 def test_colors_are_named_in_the_style_alone_and_an_edit_of_the_file_redraws_every_figure():

@@ -57,13 +57,3 @@ def test_the_row_of_a_plugin_stays_however_it_ranks(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(tmp_path))
     shown = [key for labels in short(large(methods, ("pooled",))).rows for key, _ in labels]
     assert {"net0", "gpca", "net19"} <= set(shown)
-
-
-def test_small_tables_and_lists_of_words_are_whole():
-    cells, columns = {(0, "n"): Cell(1, 0, 3, 9)}, {"n": Column("n")}
-    small = Table("claims", "What", {"a": "A"}, ((("x", "X"),),), "metric", columns, cells)
-    assert short(small) is small
-    assert small.markdown().startswith("**What**\n")
-    rows = tuple(((f"{k}", "word"),) for k in range(99))
-    words = Table("claims", "What", {"a": "A"}, rows, "metric", columns, cells)
-    assert short(words) is words

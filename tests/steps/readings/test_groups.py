@@ -123,14 +123,6 @@ def test_severities_come_in_thirds_of_each_concept(run_files, halves):
     assert {reading[1] for reading, *_ in found} == {"paper"}  # there are no predictions of the other
 
 
-def test_other_severities_are_learned_by_their_own_classifier(run_files):
-    found = rows_of(
-        severities.retrained, run_files, {"range": ["weaker", "stronger"], "classifier": ["paper", "converged"]}
-    )
-    assert {reading for reading, *_ in found} == {("weaker", "paper"), ("weaker", "converged")}
-    assert found[("weaker", "paper"), "gpca_paper", "accuracy", "all"] > 0.9
-
-
 def test_pool_holds_the_share_and_labels_are_counted_to_the_target(run_files):
     found = rows_of(labels.pool, run_files, {"new_share": [0.1, 0.4], "batch": [1, 2], "initial": [8, 400]})
     kinds = {(reading, method, metric) for reading, method, metric, _ in found}
@@ -171,13 +163,6 @@ def test_repeats_on_frames_vary_in_what_they_say(run_files, embedded, tmp_path):
     assert {row[4]["accuracy", "all"] for row in rows[:3]} == {15 / 18}
 
 
-def test_features_are_chosen_by_name(run_files):
-    found = rows_of(learners.classic_features, run_files, {"features": ["all", "counts", "residual"]})
-    counts = {reading[0]: v for (reading, _, _, concept), v in found.items() if concept == "overlap"}
-    assert counts["counts"] == 1  # a cropped cloud has fewer points
-    assert counts["residual"] < 1
-
-
 def test_the_cold_classifier_of_the_labels_is_the_protocols(run_files):
     choices = {"learning_rate": [0.1], "iterations": [20], "start": ["cold", "warm"], "inputs": ["labeled", "pool"]}
     found = rows_of(labels.classifiers, run_files, choices)
@@ -193,14 +178,6 @@ def test_the_cold_classifier_of_the_labels_is_the_protocols(run_files):
         for inputs in choices["inputs"]
         for metric in ("labels_to_target", "epochs_at_target", "reached")
     }
-
-
-def test_where_the_posterior_alone_moves_no_epochs_are_counted(run_files):
-    choices = {"learning_rate": [0.1], "iterations": [20], "start": ["posterior"], "inputs": ["pool"]}
-    found = rows_of(labels.classifiers, run_files, choices)
-    assert {metric for _, _, metric, _ in found} == {"labels_to_target", "reached"}
-    reading = (0.1, 20, "posterior", "pool")
-    assert 0 < found[reading, "random", "labels_to_target", "overlap"] <= 6
 
 
 OBJECTS = ["all", "seen", "unseen"]

@@ -69,11 +69,3 @@ def test_every_quantity_is_measured_in_every_condition(run_files):
         assert values_K.shape == (7,)
         assert np.isfinite(values_K).all()
     assert max(measured["divergence"][0], measured["divergence_reversed"][0]) < 1e-12
-
-
-def test_equal_values_name_nothing():
-    values_S_3 = np.array([[1.0, 1, 1], [-5, 1, 2]])
-    concept_S = np.array(["noise", "noise"])
-    assert knobs._accuracy(concept_S, values_S_3, "signed") == 0
-    assert knobs._accuracy(concept_S, values_S_3, "absolute") == 0.5
-    assert knobs._accuracy(concept_S, values_S_3, "lowest") == 0.5

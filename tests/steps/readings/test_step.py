@@ -74,13 +74,6 @@ def test_a_group_that_needs_more_samples_than_there_are_says_how_to_get_on(run_f
     assert not (tmp_path / "pool.csv").exists()
 
 
-def test_readings_are_all_combinations_and_their_names_say_which():
-    readings = readings_of({"floor": [1e-6, 1e-4], "sign": ["signed", "absolute"]})
-    assert [name_of("shap", reading) for reading in readings] == [
-        *("shap/1e-06/signed", "shap/1e-06/absolute", "shap/0.0001/signed", "shap/0.0001/absolute")
-    ]
-
-
 def test_the_grid_has_every_group_and_each_has_a_function():
     assert list(GRID) == list(GROUPS)
     for name, group in GROUPS.items():
@@ -104,29 +97,6 @@ def test_a_grid_that_cannot_be_run_stops_when_the_config_is_loaded(change, messa
         check(with_defaults({"readings": {"groups": change}}))
 
 
-@pytest.mark.parametrize(
-    ("group", "reading", "words"),
-    [
-        ("kernel", "rbf/100", "RBF, 100 iterations"),
-        ("pool", "0.01/4/120", "0.01 of the pool is new, batches of 4, 120 labels at the start"),
-        (
-            "gpc_start",
-            "raw/kmeans/default/full",
-            "raw inputs, inducing inputs by k-means, default lengthscale, all samples at once",
-        ),
-        ("kernel", "rbf", "rbf"),  # not of this form
-        ("someones", "rbf/100", "rbf, 100"),
-    ],
-)
-def test_a_reading_is_words(group, reading, words):
-    assert reading_words.reading(group, reading) == words
-
-
-def test_sets_that_are_joined_are_both_named():
-    shown = reading_words.reading("diagnostics", "in_distribution+source/knn_embedding/max_score/aurc")
-    assert shown.startswith("samples as in training and another dataset, distance to neighbors in the embedding, 1 -")
-
-
 @pytest.mark.parametrize("group", GRID)
 def test_every_reading_of_the_suite_has_words_of_its_own(group):
     names = list(GROUPS[group].choices)
@@ -137,10 +107,3 @@ def test_every_reading_of_the_suite_has_words_of_its_own(group):
     for reading in readings:
         for name, value in reading.items():
             assert name in NUMBERS or all(part in WORDS[name] for part in str(value).split("+"))
-
-
-def test_reasons_say_groups_and_readings_in_words():
-    words = reading_words
-    assert words.group("gpc_start") == "How the GPC starts"
-    assert "/" not in words.reading("diagnostics", "in_distribution/knn_analytical/max_score/auroc_error")
-    assert words.group("mine") == "mine"

@@ -42,11 +42,6 @@ def test_stein_particles_spread_as_a_gaussian():
     assert np.sqrt(values.mean()) == pytest.approx(0.9, abs=0.15)
 
 
-def test_one_particle_alone_climbs_to_the_maximum():
-    ended = posterior.descend(slope, np.full((1, 6), 0.2), 400, 0.02)
-    assert ended[0] == pytest.approx(MEAN, abs=2e-3)
-
-
 def test_the_slope_is_that_of_the_density():
     """Against differences of prior and likelihood, with the matches that the pose has."""
     pair = registered(noise=0.02)
