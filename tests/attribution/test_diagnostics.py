@@ -66,21 +66,6 @@ def test_bins_hold_a_confidence_of_one_and_within_one_errors_of_both_signs_cance
     assert d.calibration_error(confident(p), target) == pytest.approx(overall)
 
 
-def test_proper_scores_of_certain_and_uniform_predictions():
-    target, uniform, wrong = np.array([0, 1, 2]), np.full((3, 3), 1 / 3), np.eye(3)[[1, 2, 0]]
-    scores = [[score(p, target) for score in (d.negative_log_likelihood, d.brier_score)] for p in (np.eye(3), uniform)]
-    assert scores == [[0, 0], [pytest.approx(np.log(3)), pytest.approx(2 / 3)]]
-    assert d.brier_score(wrong, target) == 2
-    assert np.isfinite(d.negative_log_likelihood(wrong, target))
-
-
-def test_rank_correlation_is_of_ranks_and_defined_for_constants():
-    x = RANDOM.normal(size=50)
-    assert d.rank_correlation(x, np.exp(x)) == pytest.approx(1)
-    assert d.rank_correlation(x, -x) == pytest.approx(-1)
-    assert d.rank_correlation(x, np.ones(50)) == d.rank_correlation(x[:1], x[:1]) == 0
-
-
 def test_some_printed_values_cannot_belong_to_the_printed_accuracies():
     # Table V: the forest's area at 98.0 % is larger than any order allows; the GPC's at 99.3 % than a random one.
     assert worst_aurc(1 - 0.98) < 0.1145

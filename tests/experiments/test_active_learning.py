@@ -16,7 +16,6 @@ from gpca.experiments.active_learning import (
     active_learning_overlap,
     table3_active_learning,
     table3_extended,
-    table3_stream,
     titles,
 )
 from gpca.experiments.label_curves import MOST_LINES, STYLES, families, mean_curves
@@ -126,12 +125,6 @@ def test_accuracies_have_the_farther_bounds_of_those_over_seeds_and_families(met
     assert wider.cells[2, "labels_bald_kmeans"] == table.cells[2, "labels_bald_kmeans"]  # no share of samples
 
 
-def test_without_a_rare_concept_nothing_is_said_of_it(metrics):
-    table = made(table3_active_learning, metrics, rare=None)
-    assert not [note for note in table.footnotes if "percent of the pool" in note or "Other rows" in note]
-    assert [label for _, (label, _) in table.rows] == ["pretrained", "unseen"]
-
-
 def test_extended_averages_over_the_concepts_held_out_and_leaves_the_oracle_out_of_the_comparison(metrics):
     markdown = made(table3_extended, metrics).markdown()
     assert "Labels, overlap" in markdown
@@ -142,23 +135,6 @@ def test_extended_averages_over_the_concepts_held_out_and_leaves_the_oracle_out_
     assert "**" not in oracle
     assert f"**75.0 ({wilson(75)})**" in markdown
     assert "tream" not in markdown.split("Mean over")[0]
-
-
-def test_stream_shows_streams_alone(metrics):
-    markdown = made(table3_stream, metrics).markdown()
-    assert f"| YCB | {titles()['stream_bald']} |" in markdown
-    assert "60 ± 25" in markdown
-    assert "Random" not in markdown
-    assert "400 samples arrive one by one; the first 100" in markdown
-
-
-@pytest.mark.parametrize("make", [table3_active_learning, table3_extended, table3_stream])
-def test_stand_ins_are_said_and_nothing_to_show_is_a_fault(metrics, make):
-    table = made(make, metrics, sources=STAND_INS)
-    assert "on procedural stand-ins" in table.caption
-    assert "YCB (procedural stand-in)" in table.markdown()
-    with pytest.raises(InputError, match="has nothing to show"):
-        made(make, metrics[:0])
 
 
 def test_the_families_of_test_samples_alone_are_counted_and_a_file_of_another_seed_is_refused(registrations, tmp_path):
@@ -230,15 +206,6 @@ def test_the_target_is_named_the_seeds_are_counted_and_other_sources_draw_nothin
     assert [text.get_text() for text in figure.texts] == ["Means over 2 seeds"]
     with pytest.raises(InputError, match="has no curve of these sources and strategies"):
         drawn(curve_files, {"cups": REAL["ycb"]})
-
-
-def test_no_two_strategies_look_alike():
-    looks = [(color, line) for color, line, _ in STYLES.values()]
-    assert len(set(looks)) == len(looks)
-
-
-def test_the_figure_is_the_same_bytes_each_time(curve_files, same_bytes):
-    same_bytes(lambda: drawn(curve_files))
 
 
 def test_a_query_is_drawn_with_few_or_many_points(tmp_path):

@@ -87,14 +87,8 @@ def test_faults_are_one_line(files):
 
 
 REAL = {"linemod": {"title": "LINEMOD", "stand_in": False}, "ycb": {"title": "YCB", "stand_in": False}}
-STAND_INS = {name: entry | {"stand_in": True} for name, entry in REAL.items()}
 EXPLAINERS = ("gpca_paper", "gpca", "shap_additive", "shap_oracle")
 GPCA = "GP-CA (trained longer)"
-TABLES = (
-    (table1_single_baselines,),
-    (table1_extended, pd.DataFrame(columns=list(TIDY_COLUMNS))),
-    (table2_per_concept,),
-)
 
 
 def made(table, *numbers, sources=REAL, explainers=EXPLAINERS):
@@ -152,16 +146,6 @@ def test_table1_says_who_explains_fewer_samples_and_table2_has_only_gpca(metrics
     assert "SHAP" not in markdown
 
 
-def test_stand_ins_are_said_in_title_and_row(metrics):
-    for make, *costs in TABLES:
-        table = made(make, metrics, *costs, sources=STAND_INS)
-        assert "on procedural stand-ins" in table.caption
-        assert "LINEMOD (procedural stand-in)" in table.markdown()
-        mixed = made(make, metrics, *costs, sources=STAND_INS | {"ycb": REAL["ycb"]})
-        assert "partly on procedural stand-ins" in mixed.caption
-        assert "| YCB |" in mixed.markdown()
-
-
 def test_one_seed_has_an_interval_over_families_and_different_numbers_are_named():
     table = made(table1_single_baselines, tidy({("ycb", "gpca", "all"): 0.5}, seeds=1))
     assert "| YCB | 50.0 (47.0 to 52.0) |" in table.markdown()
@@ -207,12 +191,6 @@ def test_ties_at_the_printed_precision_are_all_bold_unless_most_of_a_large_group
     assert replace(table, compared=([key for key in cells if key[0] > 1],)).best() == {
         (row, "a") for row in range(2, 7)
     }
-
-
-def test_metrics_without_these_explainers_are_refused(metrics):
-    for make, *costs in TABLES:
-        with pytest.raises(InputError, match="table '"):
-            made(make, metrics, *costs, explainers=["sa_local_additive"])
 
 
 def test_column_text_rounds_and_shows_missing_intervals():

@@ -84,18 +84,6 @@ def test_the_grid_has_every_combination_with_its_calibration():
     assert ("ycb", "rbf", "0.01", "100", "elbo", -1.0, -1.0, -1.0, 3, 0, False) in table.records()
 
 
-@pytest.mark.parametrize("make", [lambda run, _grid, intervals: table4_kernels(run, intervals), table4_grid])
-def test_stand_ins_are_said_and_nothing_to_show_is_a_fault(make):
-    table = make(run(stand_in=True), grid(), intervals())
-    assert "on procedural stand-ins" in table.caption
-    with pytest.raises(InputError, match="has nothing to show"):
-        make(REAL, grid(("cups",)), intervals(("cups",)))
-
-
-def test_the_figure_is_the_same_bytes_each_time(same_bytes):
-    same_bytes(lambda: kernel_learning_curves(run(ycb="YCB", linemod="LINEMOD (procedural stand-in)"), grid()))
-
-
 def test_the_figure_has_the_accuracies_that_the_paper_prints():
     printed = printed_accuracies("linemod")
     assert set(printed) == set(PRINTED)

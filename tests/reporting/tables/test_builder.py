@@ -5,7 +5,7 @@ import pytest
 
 from gpca.errors import InputError
 from gpca.reporting.tables.builder import INTERVAL, TableBuilder, mean_over
-from gpca.reporting.tables.cells import cell_of_repeats, plain_cell, rows_where
+from gpca.reporting.tables.cells import cell_of_repeats, plain_cell
 from gpca.reporting.tables.table import Cell, Column
 from gpca.reporting.words import span
 
@@ -71,12 +71,6 @@ def test_across_the_columns_of_a_row_all_compete_and_down_a_column_the_rivals_wh
     assert built(builder).best() == best
 
 
-def test_comparisons_add_up(builder):
-    builder.compare_down(["b"])
-    builder.compare_across(["a", "b"])
-    assert len(built(builder).compared) == 1 + 5
-
-
 @pytest.mark.parametrize("use", [TableBuilder.most_seeds, built])
 def test_a_table_without_rows_is_refused_by_its_name(use):
     with pytest.raises(InputError, match=r"^table 'table0': has nothing to show"):
@@ -129,14 +123,6 @@ def test_means_over_few_seeds_and_what_all_share_are_not_bold():
     builder.add_row(labels("ycb", "shap"), cells(a=4, b=5))
     builder.compare_across("ab")
     assert built(builder).best() == {(1, "b")}
-
-
-def test_rows_are_found_by_all_that_is_wanted():
-    frame = pd.DataFrame({"source": ["a", "a", "b"], "seed": [0, 1, 1], "value": [1.0, 2.0, 3.0]})
-    assert rows_where(frame, source="a", seed=1)["value"].tolist() == [2.0]
-    assert rows_where(frame, source="a")["value"].tolist() == [1.0, 2.0]
-    assert rows_where(frame, source=None).empty
-    assert len(rows_where(frame)) == 3
 
 
 NONE = "with fewer than 3 there is no interval and no bold"
