@@ -5,8 +5,7 @@ import pytest
 from scipy.spatial import KDTree
 
 from baselines.residuals import FLOOR, Residuals
-from gpca.errors import InputError
-from gpca.explainers.registry import explainer_entry, require_settings
+from gpca.explainers.registry import explainer_entry
 from gpca.pairs.dataset import ragged
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.uncertainty.spread import SMALLEST_RESIDUAL, log_residual
@@ -85,12 +84,3 @@ def test_a_seed_repeats_every_byte_and_a_concept_absent_from_training_scores_0(n
     assert np.array_equal(first, again)
     assert (first[:, CONCEPTS.index("noise")] == 0).all()
     assert first.sum(axis=1) == pytest.approx(1)
-
-
-def test_the_config_may_set_what_they_take():
-    require_settings("residuals_logistic", {"inverse_regularisation": 0.1, "floor": 1e-5})
-    require_settings("residuals_forest", {"trees": 20, "floor": 1e-5})
-    with pytest.raises(InputError, match="setting floor"):
-        require_settings("residuals_forest", {"floor": 0})
-    with pytest.raises(InputError, match="setting"):
-        require_settings("residuals_forest", {"leaves": 3})

@@ -72,10 +72,6 @@ def test_hypotheses_clouds_and_eight_errors_are_shown_with_their_words(causes, e
     assert len(bars.collections) == len(weights)
 
 
-def test_the_figure_is_the_same_bytes_each_time(shown_files, same_bytes):
-    same_bytes(lambda: draw(shown_files))
-
-
 def test_a_file_of_other_settings_is_refused(causes, enacted, shown_files, tmp_path):
     path = tmp_path / "reenactments/four/seed100.npz"
     replace(enacted, error=enacted.error + 0.01).save(path)

@@ -8,7 +8,6 @@ from gpca.pairs.perturbation import within_half_space
 from gpca.reenactment.hypotheses import (
     distinct_rows,
     find_hypotheses,
-    first_of_alike,
     log_prior,
     rotations,
     search_starts,
@@ -87,12 +86,6 @@ def test_a_can_has_one_hypothesis_however_it_is_turned_about_its_axis(can):
     assert surface.errors((hypotheses[0].T @ inverse(pair_of(candidate)[1]))[None])[0] < 0.02
 
 
-def test_no_more_are_kept_than_the_settings_say(drill):
-    candidate = candidate_of(drill, "noise", "pose", "overlap")
-    pair, _ = pair_of(candidate)
-    assert len(found(pair, ModelSurface(candidate.model), replace(SETTINGS, hypotheses=2))) <= 2
-
-
 def test_poses_that_leave_the_surface_where_it_is_are_one(can):
     surface = ModelSurface(can[:400])
     turns = exp(np.array([[0, 0, 0, 0, 0, 0], [0, 0, 0.7, 0, 0, 0], [0, 0, 0, 0.1, 0, 0], [1e-4, 0, 0, 0.1, 0, 0]]))
@@ -123,9 +116,3 @@ def test_evidence_from_elsewhere_counts(drill):
     )
     assert surface.apart((near @ inverse(T_true))[None])[0] < 0.02
     assert surface.apart((far @ inverse(T_true))[None])[0] > 0.05
-
-
-def test_of_poses_that_are_alike_the_first_counts():
-    offsets = np.array([0, 1e-4, 0.1, 0.1001, 2e-4])
-    poses = exp(offsets[:, None] * np.array([[1.0, 0, 0, 0, 0, 0]]))
-    assert first_of_alike(poses).tolist() == [True, False, True, False, False]

@@ -87,22 +87,6 @@ def test_intervals_are_of_the_same_measures_over_families(evaluated, grid, tmp_p
         collect_intervals(None, [])
 
 
-def test_a_larger_rate_raises_the_bound_further(grid):
-    last = grid[grid["iterations"] == 6].set_index(["kernel", "learning_rate"])["elbo"]
-    for kernel in GRID.kernels:
-        assert last[kernel, 0.1] > last[kernel, 0.01]
-
-
-def test_files_are_read_back_with_source_and_seed(grid, tmp_path):
-    paths = [tmp_path / "kernels/tiny" / f"seed{seed}.csv" for seed in (0, 3)]
-    for path in paths:
-        write_csv(path, grid)
-    read = read_grids(paths)
-    assert read["source"].unique().tolist() == ["tiny"]
-    assert read["seed"].tolist() == [0] * 8 + [3] * 8
-    assert read["accuracy"].to_numpy() == pytest.approx(np.tile(grid["accuracy"], 2), abs=1e-6)
-
-
 def test_bad_files_are_named(grid, tmp_path):
     path = tmp_path / "kernels/tiny/seed0.csv"
     write_csv(path, grid.assign(nll=np.nan))
@@ -114,12 +98,6 @@ def test_bad_files_are_named(grid, tmp_path):
     for read in (read_grids, lambda files: collect(None, files)):
         with pytest.raises(InputError, match="no files were given"):
             read([])
-
-
-@pytest.mark.parametrize("split", ["train", "test"])
-def test_a_missing_split_is_a_fault(embedded, split):
-    with pytest.raises(InputError, match="tiny, seed 0: lack a split"):
-        evaluate_grid(embedded.subset(embedded.rows(split)), GRID, "tiny", 0)
 
 
 def test_every_setting_and_measure_of_every_seed_becomes_a_row(tmp_path):

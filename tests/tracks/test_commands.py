@@ -9,8 +9,6 @@ import pytest
 
 from gpca.__main__ import main
 from gpca.alignment.icp import ICPSettings
-from gpca.classifier.scores import Attribution
-from gpca.pairs.perturbation import CONCEPTS
 from gpca.process import plugins
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.steps.repair import RepairSettings, World, searched, try_all
@@ -157,12 +155,6 @@ def test_a_method_is_tried_on_few_samples_before_all_are_made(
     assert folders and tmp_path / "none" not in folders
 
 
-def test_scores_are_taken_by_the_names_of_their_labels():
-    scores_N_C = np.array([[0.1, 0.2, 0.7]])
-    answer = Attribution.of_scores(("pose", "overlap", "noise"), scores_N_C, seconds=0.0).in_order(CONCEPTS)
-    assert answer.scores_N_C.tolist() == [[0.7, 0.1, 0.2]] and answer.predicted_N.tolist() == ["noise"]
-
-
 def test_a_fault_of_predictions_is_one_line_and_the_status_says_so(published, tmp_path, capsys):
     (tmp_path / "said.csv").write_text("# track: causes\nsource,seed,sample\n")
     assert main(["score", "causes", str(tmp_path / "said.csv")]) == 2
@@ -204,11 +196,6 @@ def test_a_name_stands_on_a_track_once(board, capsys):
 
 def test_the_submissions_of_the_repository_are_without_fault():
     assert main(["leaderboard", "--check"]) == 0
-
-
-def test_a_folder_of_submissions_that_is_not_there_is_no_empty_one(capsys):
-    assert main(["leaderboard", "--check", "--submissions", "nowhere"]) == 2
-    assert "nowhere: no such folder" in capsys.readouterr().err
 
 
 def test_a_faulty_submission_makes_no_page(board, capsys):
