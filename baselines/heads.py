@@ -1,8 +1,8 @@
 """Heads of a neural network on the embeddings, with deep learning's measures of uncertainty (paper, Table V).
 
 The encoder is fixed; a head with one hidden layer is trained on the labeled embeddings. Draws of the logits give
-scores, variances and BALD like GP-CA's: members of a deep ensemble (Lakshminarayanan et al. 2017), passes of
-Monte-Carlo dropout (Gal & Ghahramani 2016), or Laplace's approximation over the last layer (Daxberger et al. 2021).
+scores, variances and BALD like GP-CA's: members of a deep ensemble (Lakshminarayanan et al. 2017), or passes of
+Monte-Carlo dropout (Gal & Ghahramani 2016).
 """
 
 import math
@@ -12,7 +12,6 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from gpca.attribution.diagnostics import negative_log_likelihood
 from gpca.classifier.scores import summarize_draws
 from gpca.explainers.classifiers import known_concepts
 from gpca.explainers.interface import DrawingExplainer, ExplainerEntry, attached
@@ -149,77 +148,8 @@ class Dropout(HeadLearner):
         return self._heads.logits((hidden_1_N_H * kept_M_1_H / (1 - self._rate)).astype(np.float32))
 
 
-class LastLayerLaplace(HeadLearner):
-    """Laplace's approximation over the last layer, with the full generalized Gauss-Newton matrix.
-
-    The last layer is refitted to the hidden units under a Gaussian prior, because the approximation needs a maximum of
-    the posterior. The prior's precision is the one with the least NLL on a fifth of the training samples after training
-    on the others. The evidence would choose far too timid scores, as the hidden units learned from the same labels.
-    """
-
-    PRECISIONS = tuple(10.0 ** (exponent / 2) for exponent in range(6, -5, -1))
-
-    def __init__(self, source: str, seed: int, draws: Count = 1000, **training: HeadArguments) -> None:
-        super().__init__(source, seed, **training)
-        self._draws = draws
-
-    def _train(self, h_N_d: np.ndarray, target_N: np.ndarray) -> None:
-        order_N = generator(*self._axes, "validation").permutation(len(target_N))
-        validation, rest = order_N[::5], np.delete(order_N, np.s_[::5])
-        precision = self.PRECISIONS[0]
-        if len(rest):
-            super()._train(h_N_d[rest], target_N[rest])
-            losses = []
-            for candidate in self.PRECISIONS:
-                self._approximate(h_N_d[rest], target_N[rest], candidate)
-                scores_N_C, _, _ = summarize_draws(self._draw_logits(h_N_d[validation]))
-                losses.append(negative_log_likelihood(scores_N_C, target_N[validation]))
-            precision = self.PRECISIONS[int(np.argmin(losses))]
-        super()._train(h_N_d, target_N)
-        self._approximate(h_N_d, target_N, precision)
-
-    def _approximate(self, h_N_d: np.ndarray, target_N: np.ndarray, precision: float) -> None:
-        """Find the weights (F, C) that minimize cross-entropy + precision / 2 · |weights|², and the curvature there."""
-        from scipy.optimize import minimize
-        from scipy.special import log_softmax
-
-        features_N_F, wanted_N_C = self._features(h_N_d), np.eye(len(CONCEPTS))[target_N]
-        shape = (features_N_F.shape[1], len(CONCEPTS))
-
-        def loss(flat: np.ndarray) -> tuple[float, np.ndarray]:
-            weights_F_C = flat.reshape(shape)
-            log_p_N_C = log_softmax(features_N_F @ weights_F_C, axis=1)
-            gradient_F_C = features_N_F.T @ (np.exp(log_p_N_C) - wanted_N_C) + precision * weights_F_C
-            return -np.sum(wanted_N_C * log_p_N_C) + 0.5 * precision * flat @ flat, gradient_F_C.ravel()
-
-        optimum = minimize(loss, np.zeros(shape).ravel(), jac=True, method="L-BFGS-B")
-        self._weights_F_C = optimum.x.reshape(shape)
-        p_N_C = np.exp(log_softmax(features_N_F @ self._weights_F_C, axis=1))
-        blocks = []  # of the curvature (C·F, C·F), classes first
-        for p_N, one_hot_C in zip(p_N_C.T, np.eye(len(CONCEPTS)), strict=True):
-            curvature_N_C = p_N[:, None] * (one_hot_C - p_N_C)
-            blocks.append([(features_N_F * curvature_N[:, None]).T @ features_N_F for curvature_N in curvature_N_C.T])
-        eigenvalues, self._vectors = np.linalg.eigh(np.block(blocks))
-        self._deviations = 1 / np.sqrt(np.maximum(eigenvalues, 0) + precision)
-
-    def _draw_logits(self, h_N_d: np.ndarray) -> np.ndarray:
-        features_N_F, n_classes = self._features(h_N_d), len(CONCEPTS)
-        # The weights have the covariance W Wᵀ with W (C·F, K), a sample's logits R Rᵀ with R (C, K).
-        roots_C_F_K = (self._vectors * self._deviations).reshape(n_classes, features_N_F.shape[1], -1)
-        roots_C_N_K = features_N_F @ roots_C_F_K
-        covariance_N_C_C = np.einsum("cnk,dnk->ncd", roots_C_N_K, roots_C_N_K)
-        cholesky_N_C_C = np.linalg.cholesky(covariance_N_C_C + 1e-9 * np.eye(n_classes))
-        normal_M_C = generator(*self._axes, "draws").normal(size=(self._draws, n_classes))
-        return features_N_F @ self._weights_F_C + np.einsum("ncd,md->mnc", cholesky_N_C_C, normal_M_C)
-
-    def _features(self, h_N_d: np.ndarray) -> np.ndarray:
-        hidden_N_H = self._heads.hidden(h_N_d)[0].astype(float)
-        return np.column_stack([hidden_N_H, np.ones(len(hidden_N_H))])
-
-
 _entry = partial(ExplainerEntry, sees=("source",), reads="embeddings")
 EXPLAINERS = {
     "learner_ensemble": _entry("Deep ensemble of heads", Ensemble),
     "learner_dropout": _entry("MC dropout of the head", Dropout),
-    "learner_laplace_head": _entry("Last-layer Laplace of the head", LastLayerLaplace),
 }

@@ -5,7 +5,7 @@ import pytest
 
 from baselines import dirichlet_gp, heads, learners
 from baselines.dirichlet_gp import JITTER, DirichletGP
-from baselines.heads import Dropout, Ensemble, LastLayerLaplace
+from baselines.heads import Dropout, Ensemble
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 
@@ -15,7 +15,6 @@ EXPLAINERS = {**learners.EXPLAINERS, **DRAWING}
 FEW_STEPS = {  # for what is true of a head however long it was trained
     "learner_ensemble": {"members": 2, "steps": 30},
     "learner_dropout": {"steps": 30},
-    "learner_laplace_head": {"steps": 30, "hidden": 16},
 }
 
 
@@ -153,17 +152,3 @@ def direct(learner, h):
 def test_an_ensemble_has_a_draw_per_member_and_dropout_one_per_pass():
     assert direct(Ensemble("a", 0, members=4, hidden=8), H[:5]).shape == (4, 5, 3)
     assert direct(Dropout("a", 0, passes=7, hidden=8), H[:5]).shape == (7, 5, 3)
-
-
-def test_laplace_draws_have_the_covariance_of_the_linearised_last_layer_and_are_uncertain_far_away():
-    drawn = direct(LastLayerLaplace("a", 0, hidden=16), np.concatenate([H, 20 * H]))
-    assert drawn[:, 60:].std(axis=0).min() > drawn[:, :60].std(axis=0).mean()
-    laplace = LastLayerLaplace("a", 0, draws=5000, hidden=6)
-    drawn_M_N_C = direct(laplace, H[:4])
-    covariance = (laplace._vectors * laplace._deviations**2) @ laplace._vectors.T
-    features = laplace._features(H[:4])
-    for n in range(4):
-        jacobian_C_P = np.kron(np.eye(3), features[n])
-        expected = jacobian_C_P @ covariance @ jacobian_C_P.T
-        assert np.cov(drawn_M_N_C[:, n].T) == pytest.approx(expected, rel=0.1, abs=0.05 * expected.max())
-    assert drawn_M_N_C.mean(axis=0) == pytest.approx(features @ laplace._weights_F_C, abs=0.1)

@@ -44,7 +44,6 @@ LEARNERS = {
     "learner_dirichlet_gp": {"iterations": 5},
     "learner_ensemble": {"members": 2, "steps": 10},
     "learner_forest": {},
-    "learner_laplace_head": {"draws": 50, "steps": 10, "hidden": 8},
 }
 PREPARED = "from gpca.process.processor import prepare; prepare(); import json, sys; "
 CHAIN = (
