@@ -1,7 +1,4 @@
-"""Rivals of GP-CA that read the embedding of the aligned source alone, as it does in the paper.
-
-The same explainers name causes, with "nominal" as a further class.
-"""
+"""Rivals of GP-CA that read the embedding of the aligned source alone, as it does in the paper."""
 
 from functools import partial
 
@@ -52,10 +49,7 @@ class ConceptVectors(ScoringExplainer):
 
 
 class SoftmaxHead(ScoringExplainer):
-    """The encoder's own head, which GP-CA drops: softmax of its logits, averaged over the draws from a cloud.
-
-    It was trained with the encoder, so labels given to ``fit`` have no effect.
-    """
+    """The encoder's own head, which GP-CA drops: softmax of its logits, averaged over the draws from a cloud."""
 
     trained_with_encoder = True
 

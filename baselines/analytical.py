@@ -18,10 +18,7 @@ from gpca.settings import Bounds, Count
 
 
 class AnalyticalGPC(GPCA):
-    """GP-CA with analytical features in place of the embedding, the point-count ratio among them or not.
-
-    Local shape is measured at `shape_points` source points at most, by `neighbours` points, itself included.
-    """
+    """GP-CA with analytical features in place of the embedding, the point-count ratio among them or not."""
 
     def __init__(
         self,

@@ -1,7 +1,4 @@
-"""Gates: one number of the registration itself decides whether it is fine. They name no cause.
-
-Below the best threshold of an alarm, nothing is wrong: this gives a method without a class "nominal" one.
-"""
+"""Gates: one number of the registration itself decides whether it is fine. They name no cause."""
 
 from __future__ import annotations
 
@@ -24,10 +21,7 @@ assert LABELS[0] == NOMINAL  # scores have its column first
 
 
 class NominalThreshold:
-    """Turns an alarm (larger is worse) and the scores of the causes into scores over `LABELS`.
-
-    `accuracy` is the balanced accuracy of the threshold on the labeled samples; 0.5 if undefined.
-    """
+    """Turns an alarm (larger is worse) and the scores of the causes into scores over `LABELS`."""
 
     accuracy = 0.5
 
@@ -48,10 +42,7 @@ class NominalThreshold:
         return self
 
     def scores(self, alarm_N: np.ndarray, shares_N_3: np.ndarray) -> np.ndarray:
-        """Return scores (N, 4) with sum one: of nominal, and of the causes in proportion to their shares.
-
-        At the threshold, nominal equals the largest cause, so the label follows the threshold.
-        """
+        """Return scores (N, 4) with sum one: of nominal, and of the causes in proportion to their shares."""
         from scipy.special import expit
 
         wrong_N = expit((alarm_N - self._threshold) / self._scale)
@@ -96,10 +87,7 @@ def motion_alarm(registrations: Registrations, name: str) -> np.ndarray:
 
 
 class CovarianceGate(Alarm):
-    """The alarm is ln |Σ + εI| of the covariance that an untrained estimator gives at the result of ICP.
-
-    A registration without an estimate, as nothing holds it, counts as one of covariance I.
-    """
+    """The alarm is ln |Σ + εI| of the covariance that an untrained estimator gives at the result of ICP."""
 
     def __init__(self, estimator: str, source: str, seed: int, floor: Positive = 1e-12) -> None:
         self._estimator, self._floor = estimator, floor

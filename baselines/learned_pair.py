@@ -33,10 +33,7 @@ NUMBERS: Columns = {"motion": EVERY, "starts": EVERY}  # that an encoder for cau
 
 
 class LearnedPairGPCA(PairDescription, GPCA):
-    """GP-CA's classifier on the embedding of an encoder of pairs, which may read how far ICP moved the cloud.
-
-    Each of the `points` of a cloud is described by its relation to the other cloud; each epoch draws `draw_points`.
-    """
+    """GP-CA's classifier on the embedding of an encoder of pairs, which may read how far ICP moved the cloud."""
 
     def __init__(
         self,
@@ -111,10 +108,7 @@ def draw_pairs(
     *axes: object,
     fewest: int | None = None,
 ) -> list[torch.Tensor]:
-    """Draw `n_points` random points of either cloud, (B, 2, n_points, F), with the motions (B, M).
-
-    `points` (S, 2, P, F) and `motion` (S, M) are names of attached arrays.
-    """
+    """Draw `n_points` random points of either cloud, (B, 2, n_points, F), with the motions (B, M)."""
     import torch
 
     points_S_2_P_F = registrations.attached[points]

@@ -1,7 +1,4 @@
-"""Other learners on GP-CA's embeddings, standardized on the training samples (paper, Table V).
-
-The forest and the linear SVM are the paper's: scikit-learn's defaults, 50 trees, random_state 42.
-"""
+"""Other learners on GP-CA's embeddings, standardized on the training samples (paper, Table V)."""
 
 from functools import partial
 

@@ -21,11 +21,7 @@ OBSERVED = 0  # the condition of the uncertainty design that leaves the observed
 
 
 class Residuals(ClassifierExplainer):
-    """A classifier on log forward residual, log backward residual and the log-determinant of the pose covariance.
-
-    Of the attached outcomes only the observed condition is used and charged. `floor` ε is added to the variances, so
-    that equal poses have a determinant.
-    """
+    """A classifier on log residuals both ways and the log-determinant of the covariance plus `floor` ε I."""
 
     def __init__(self, classifier, floor: float) -> None:
         super().__init__(classifier)

@@ -25,11 +25,7 @@ def local_derivatives(uncertainty_N_K: np.ndarray) -> np.ndarray:
 
 
 def partial_rank_correlations(inputs_K_3: np.ndarray, outputs_N_K: np.ndarray) -> np.ndarray:
-    """Return the PRCC (N, 3) of each input with each of N outputs over K settings (Marino et al. 2008, Sec. 2.3).
-
-    The correlation of the residuals of the input's and the output's ranks after regression on the other inputs' ranks;
-    zero where the output has no residual.
-    """
+    """Return the PRCC (N, 3) of inputs with N outputs (Marino et al. 2008, Sec. 2.3), 0 where undefined."""
     from scipy.stats import rankdata
 
     values_N_3 = np.zeros((len(outputs_N_K), inputs_K_3.shape[1]))

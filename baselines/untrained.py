@@ -56,10 +56,7 @@ class Rule(ScoringExplainer):
 
 
 class ThresholdRule(Rule):
-    """ICP turned the observed cloud by more than `turned_deg`: pose; it has too few points: overlap; else noise.
-
-    A cloud without missing parts has at least the share `complete` of the model's points.
-    """
+    """ICP turned the observed cloud by more than `turned_deg`: pose; it has too few points: overlap; else noise."""
 
     def __init__(self, source: str, seed: int, turned_deg: HalfTurn = 5.0, complete: PositiveShare = 0.95) -> None:
         self._cosine = math.cos(math.radians(turned_deg))

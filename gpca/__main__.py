@@ -40,10 +40,7 @@ def load_command(name: str) -> tuple[Callable[[ArgumentParser], None], Callable[
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run one command; a user's mistake ends as one line on stderr and status 2, Ctrl-C as status 130.
-
-    A command that checks something ends with status 1 where the check fails.
-    """
+    """Run one command; a user's mistake ends as one line on stderr and status 2, Ctrl-C as status 130."""
     arguments = sys.argv[1:] if arguments is None else arguments
     chosen = next((argument for argument in arguments if not argument.startswith("-")), None)
     return as_process(f"gpca {chosen}", lambda: _run(arguments, chosen))

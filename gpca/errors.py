@@ -7,10 +7,7 @@ from typing import Any
 
 
 class InputError(ValueError):
-    """A fault in the user's file, folder, setting or name: one line with subject, fault and remedy.
-
-    The command line prints it to stderr and exits with status 2.
-    """
+    """A fault in the user's file, folder, setting or name: one line with subject, fault and remedy."""
 
     further: tuple[str, ...] = ()  # lines of other faults of the same settings
 

@@ -25,14 +25,7 @@ def logarithm(positive: Tensor) -> Tensor:
 
 
 class Adam:
-    """Adam (Kingma and Ba 2015), or AdamW with a weight decay, with the bits of torch's fused classes.
-
-    An object of torch's class loads torch's compiler: 1.2 to 4 s in every process.
-
-    Attributes:
-        learning_rate: of the next step.
-        beta1: decay of the mean of gradients in the next step.
-    """
+    """Adam or AdamW with the bits of torch's fused classes, whose objects load torch's compiler for 1.2 to 4 s."""
 
     def __init__(self, parameters: Iterable[Tensor], learning_rate: float, weight_decay: float = 0.0) -> None:
         self.learning_rate, self.beta1, self._weight_decay = learning_rate, 0.9, weight_decay
@@ -82,12 +75,7 @@ class Adam:
 
 
 def one_cycle(step: int, steps: int, peak: float, rising: float) -> tuple[float, float]:
-    """Learning rate and `beta1` of a step of the one-cycle policy (Smith and Topin 2019), with the bits of torch's.
-
-    Args:
-        step: number of steps already made.
-        steps: number in all; `rising` of them end at the rate `peak`, the others in a fall to nearly 0.
-    """
+    """Learning rate and `beta1` of a step of the one-cycle policy (Smith and Topin 2019), with the bits of torch's."""
     top, lowest = rising * steps - 1, peak / 25
     if step <= top:
         share = step / top

@@ -186,10 +186,7 @@ def _hints(kind: Any) -> dict[str, Any]:
 
 
 def require_arguments(subject: str, function: Callable, leading: int, settings: Mapping[str, object]) -> None:
-    """Check settings that a function takes as named arguments, after `leading` others.
-
-    A number without a range must not be negative unless its default is.
-    """
+    """Check settings that a function takes as named arguments, after `leading` others."""
     read_settings(_settings_of_arguments(function, leading), settings, f"{subject}: setting")
 
 

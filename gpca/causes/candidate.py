@@ -245,10 +245,7 @@ class Counterfactuals:
 def drawn_again(
     objects: ObjectClouds, causes: Causes, row: int, source: str, seed: int, settings: CauseSettings
 ) -> tuple[Candidate, np.ndarray]:
-    """Return the candidate that a sample is, drawn again, and the points (N, 3) of its object in diameters.
-
-    Raises InputError where the sample was drawn from other objects or with other settings.
-    """
+    """Return the candidate that a sample is and its object's points (N, 3), diameters; InputError for others."""
     registrations = causes.registrations
     index = int(registrations.object_index[row])
     surface = objects.points(index).astype(np.float64) / float(objects.diameters_m[index])

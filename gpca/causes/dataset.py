@@ -101,10 +101,7 @@ def observed_only(registrations: Registrations) -> Registrations:
 
 
 def labeled(causes: Causes) -> Registrations:
-    """Return what an explainer learns: labels as the concepts, and what is `HIDDEN` from it later attached.
-
-    These are ``causes`` (S, 3), 1 where each is one, and ``error_shown`` (S,), diameters.
-    """
+    """Return what an explainer learns: labels as the concepts, and what is `HIDDEN` from it later attached."""
     shown = causes.registrations
     hidden = dict(zip(HIDDEN, (causes.truth.causes.astype(float), causes.error_shown), strict=True))
     return replace(shown, concept=labels_of(causes.truth), attached={**shown.attached, **hidden})

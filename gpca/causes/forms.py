@@ -97,10 +97,7 @@ def visible_rows(points: np.ndarray, toward: np.ndarray) -> np.ndarray:
 
 
 def what_remains(points: np.ndarray, lacking: float, random: np.random.Generator) -> np.ndarray:
-    """Return rows, in random order, of points (N, 3) in random order that a partial model has.
-
-    As often as not it lacks such a share of them, beyond a plane, or all that are hidden from one side.
-    """
+    """Return rows, in random order, of points (N, 3) in random order that a partial model has."""
     toward, of_one_side = random_direction(random), random.random() < 0.5
     if of_one_side:
         return random.permutation(visible_rows(points, -toward))

@@ -29,10 +29,7 @@ OUTLINE_POINTS = 2048  # of an object, which tell where in the image it lies
 
 
 def chosen_starts(starts: Starts, instances: Instances, source: str, settings: FrameCauseSettings) -> Starts:
-    """Return the starts that are measured, in order: of each kind a draw, of instances in scenes that may be tested.
-
-    The draw takes turns with the scenes, or the longest sequence would have most of it.
-    """
+    """Return the starts that are measured, in order: of each kind a draw, of instances in scenes that may be tested."""
     is_tested_K = instances.fold[starts.instance] != TRAINING
     scene_K = instances.cluster[starts.instance]
     chosen: list[int] = []
@@ -56,15 +53,7 @@ def measure_frames(
     settings: CauseSettings,
     points: int,
 ) -> tuple[Causes, pd.DataFrame]:
-    """Measure the causes of registrations from these starts, as :func:`gpca.causes.measuring.measure_cases` does.
-
-    Those whose object's clean pairs are off or whose mesh is not in sight are left out. `points` of what was measured,
-    at most, and of the model are registered.
-
-    Returns:
-        the registrations, all of them test samples with the number of their start; a row for each of where it was
-        seen, what it started from and what was found.
-    """
+    """Measure the causes of registrations from these starts, of `points` points at most; return a row for each, too."""
     subjects, limit = measure_clean_pairs(subjects_of(instances, starts.instance, objects), source, seed, settings)
     subject_of = {subject.index: subject for subject in subjects}
 

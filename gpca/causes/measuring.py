@@ -229,10 +229,7 @@ def found_in(causes: Causes) -> tuple[dict[str, Any], dict[str, Any]]:
 
 
 def as_causes(records: list[dict[str, Any]], axes: Axes) -> tuple[Causes, np.ndarray]:
-    """Return rows as registrations with their truth, and the seconds (S,) that ICP took for each.
-
-    A row is an explainer's view with ``sample``, ``split``, ``candidate``, ``truth`` and, of test samples, ``again``.
-    """
+    """Return rows as registrations with their truth, and the seconds (S,) that ICP took for each."""
 
     def joined(truths: list[Truth]) -> Truth:
         error_S_8 = np.concatenate([np.empty((0, len(SUBSETS))), *(each.error for each in truths)])

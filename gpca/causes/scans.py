@@ -197,14 +197,7 @@ def measure_scans(
     success: ScanSuccess,
     points: int,
 ) -> tuple[Causes, Frame]:
-    """Measure the causes of registrations from these starts, as :func:`gpca.causes.measuring.measure_cases` does.
-
-    Pairs of which too few points, of so many of each scan at most, lie on surface that both see are left out.
-
-    Returns:
-        the registrations, all of them test samples with the number of their start; a row for each of what it is and
-        what was found.
-    """
+    """Measure the causes of registrations, of `points` of each scan at most; return them and a row for each."""
     import pandas as pd
 
     drawn: dict[int, DrawnScans] = {}

@@ -90,10 +90,7 @@ def _require_unit(subject: object, ratio: float, most: float) -> None:
 def estimates_of(
     poses_by_estimator: Mapping[str, PosesByObject], place: tuple[int, int, int], alone: bool, seen: Mapping
 ) -> list[tuple[str, np.ndarray]]:
-    """Return name and pose ``T_camera_model`` of each estimator that found an object (scene, image, id) of a dataset.
-
-    Where it is not `alone`, an estimate farther than a diameter from the points that were `seen` is another one's.
-    """
+    """Return name and pose ``T_camera_model`` of each estimator that found an object (scene, image, id)."""
     estimates = []
     for name in sorted(poses_by_estimator):
         if poses := poses_by_estimator[name].get(place):

@@ -66,10 +66,7 @@ class Instances(Container):
         return np.array([f"{dataset} {scene}" for dataset, scene in zip(self.dataset, self.scene, strict=True)])
 
     def split(self, source: str, seed: int, test_share: float) -> dict[str, np.ndarray]:
-        """Return the rows of ``train`` and ``test``, by whole scenes: frames of one scene reveal each other.
-
-        The seed's fold is tested. Of scenes without one, about a share of the rows is: at least a scene, and never all.
-        """
+        """Return the rows of ``train`` and ``test``, by whole scenes: frames of one scene reveal each other."""
         by_fold = unseen(self.fold, seed)
         is_test = np.zeros(len(self), bool) if by_fold is None else by_fold
         is_drawn = self.fold == DRAWN

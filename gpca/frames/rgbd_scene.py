@@ -152,10 +152,7 @@ def lay_table(
     scene: int,
     resting: Sequence[tuple[np.ndarray, np.ndarray]],
 ) -> list[Placed]:
-    """Stand objects on the table z = 0, each in a stable pose drawn by its probability, close but not touching.
-
-    An object comes from a random direction as near to the middle as its convex outline allows.
-    """
+    """Stand objects on the table z = 0, each in a stable pose drawn by its probability, close but not touching."""
     from shapely import MultiPoint
     from shapely.affinity import translate
 

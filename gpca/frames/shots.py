@@ -211,10 +211,7 @@ def expected_surface(
     poses_n: np.ndarray,
     camera: Camera,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return which points (Q, 3) of the model were measured (Q,), and which each viewpoint would show (n, Q).
-
-    The model is ray-cast at its pose among boxes where something else was measured; unseen space counts as free.
-    """
+    """Return which points (Q, 3) of the model were measured (Q,), and which each viewpoint would show (n, Q)."""
     placed_m = transform(T_world_object, points_m)
     reach_m = NEAR * diameter_m
     measured_m = np.concatenate([shot.object_points_m(diameter_m) for shot in shots])

@@ -1,7 +1,4 @@
-"""Registrations of instances: partial clouds of depth frames, perturbed, aligned to their models, labeled.
-
-Overlap is lost to an occluder: the silhouette of another object is moved over the mask, as if it stood in front.
-"""
+"""Registrations of instances: partial clouds of depth frames, perturbed, aligned to their models, labeled."""
 
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -105,10 +102,7 @@ def _register_one(
 def occlude(
     instances: Instances, i: int, pixels_P_2: np.ndarray, share: float, random: np.random.Generator
 ) -> np.ndarray | None:
-    """Return which pixels (P,) stay visible when an occluder covers about this share of them, or None where none does.
-
-    Silhouettes of the dataset's other objects, in random order and at their size, come in from a random direction.
-    """
+    """Return which pixels (P,) stay visible when an occluder covers about this share of them; None where none does."""
     from scipy.ndimage import binary_closing
 
     same_dataset_I = instances.dataset == instances.dataset[i]

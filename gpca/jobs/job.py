@@ -19,10 +19,7 @@ from gpca.process.progress import certain_interrupts
 
 
 class Job:
-    """The files, names and settings that a rule gives a step, as attributes.
-
-    Files are paths, or lists of paths where the rule has lists; ``settings`` is a mapping.
-    """
+    """The files, names and settings that a rule gives a step, as attributes."""
 
     def __init__(self, **given: Any) -> None:
         self.__dict__.update(given)
@@ -59,11 +56,7 @@ class Job:
 
 
 def run_step(snakemake: Any) -> None:
-    """Run the step that the rule names in ``params.step``, then exit; see :func:`call`.
-
-    `snakemake` is the object that Snakemake gives a script; its input ``code`` is no data. All stderr goes to the
-    rule's log. A fault of the input ends as one line there and status 2.
-    """
+    """Run the step that the rule names in ``params.step``, stderr in the rule's log, then exit; see :func:`call`."""
     names = {"threads": snakemake.threads} | dict(snakemake.wildcards.items()) | dict(snakemake.params.items())
     prepare(names["threads"])  # before NumPy, torch and numba are loaded
     keep_freed_memory()
@@ -88,10 +81,7 @@ def call(step: str, job: Job) -> None:
 
 @contextmanager
 def workflow_script(snakemake: Any) -> Iterator[dict]:
-    """Run the block as a script of the workflow: stderr in the rule's log, provenance beside the outputs.
-
-    A fault of the input ends as one line in the log and status 2. The block can add to the provenance by the mapping.
-    """
+    """Run the block as a script of the workflow: stderr in the log, provenance, which it can add to, beside outputs."""
     from gpca.jobs.provenance import record_provenance
 
     _print_to(snakemake.log)
@@ -120,10 +110,7 @@ def _print_to(logs: Any) -> None:
 
 
 def as_process(name: str, function: Callable[[], int | None]) -> int:
-    """Call a function and return the status of the process: 0, or what the function returns.
-
-    A fault of the input, or a missing package of an extra, ends as one line on stderr and status 2; Ctrl-C as 130.
-    """
+    """Call a function and return the status of the process; a fault of the input is one line and 2, Ctrl-C 130."""
     with _as_process(f"{name}: ") as process:
         process.status = function() or 0
     return process.status

@@ -78,10 +78,7 @@ def record_path(path: Path) -> Path:
 
 
 def read_record(path: Path) -> dict[str, Any]:
-    """Return the provenance record of a file, empty where there is none; InputError for a damaged one.
-
-    Fields that are null or missing are empty.
-    """
+    """Return the provenance record of a file, empty where there is none; InputError for a damaged one."""
     record, remedy = record_path(path), f"make {path.name} again"
     if not os.path.lexists(record):
         return {}
@@ -103,11 +100,7 @@ def sha256_of_settings(settings: object) -> str:
 
 
 def _code_version() -> dict[str, object]:
-    """Return the version, the commit, and whether tracked files differ from it.
-
-    Commit and changes are null without git, and where git does not track this package, as in a virtual environment that
-    lies in another project's checkout.
-    """
+    """Return the version, the commit, and whether tracked files differ; null where git does not track this package."""
     # No import statement: it would make gpca/__init__.py code of every step, and a new version rerun all of them.
     installed = import_module("gpca").__version__
     commit, changes = None, None

@@ -20,10 +20,7 @@ REMEDY = "delete it and fetch it again, or check the url"
 
 
 def fetch(url: str, sha256: str | None, folder: str | Path, location: str | None = None) -> Path:
-    """Return the file of `url`, from the cache `folder` or downloaded to it; without a `sha256`, its sum is printed.
-
-    A faulty download is removed, but a file that was in the cache stays. `location` is that of the data below data_dir.
-    """
+    """Return the file of `url`, from the cache `folder` or downloaded to it; without a `sha256`, its sum is printed."""
     path = cached_path(url, folder)
     if path.is_file():
         _check(path, sha256, url, f"delete {path} to fetch it again or correct sha256 in the config")
@@ -70,10 +67,7 @@ def _check(path: Path, expected: str | None, url: str, remedy: str) -> str:
 
 
 def unpack(path: str | Path, folder: str | Path, largest_bytes: int = LARGEST_UNPACKED_BYTES) -> Path:
-    """Unpack an archive into a folder, whole or not at all, unless it is there, and return the folder.
-
-    Nothing leaves the folder; InputError for a damaged archive, or one of too many bytes.
-    """
+    """Unpack an archive into a folder, whole or not at all, unless it is there; InputError if damaged or huge."""
     path, folder = Path(path), Path(folder)
     if folder.is_dir():
         return folder

@@ -47,10 +47,7 @@ def files_in(folder: str | Path, patterns: Sequence[str] | None, suffixes: Seque
 
 
 def read_surface(path: Path, scale: float) -> Surface:
-    """Read one file, vertices times `scale`. Points without faces are a cloud, in which depth may be missing (NaN).
-
-    CloudCompare writes zeros as the normals of a cloud that has none, so a cloud with such a normal is given none.
-    """
+    """Read one file, vertices times `scale`; without faces it is a cloud. Normals are used where all have a length."""
     remedy, suffix = "fetch or export it again", path.suffix.lower()
     require_file(path, "no such file", remedy)
     fault = f"is truncated or not a readable {path.suffix} file ({{}})"  # for which numpy raises errors of many kinds

@@ -318,10 +318,7 @@ READERS: dict[str, Callable[[IO[bytes]], Shape]] = {  # ValueError for a file th
 
 
 def as_triangles(polygons: np.ndarray | list, by_length: bool = True) -> np.ndarray:
-    """Return the triangles (F, 3, ...) of polygons: those of triangles, first and second halves of quads, then fans.
-
-    Not `by_length`, they are in the order of the polygons.
-    """
+    """Return the triangles (F, 3, ...) of polygons: triangles, halves of quads, then fans; or in their order."""
     if set(map(len, polygons)) == {3}:
         return np.array(polygons, np.int64)
     parts = [

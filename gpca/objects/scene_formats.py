@@ -1,7 +1,4 @@
-"""Readers of legacy VTK (datasets PolyData, versions 1 to 5) and, by trimesh, of binary glTF 2.0.
-
-What follows the geometry of VTK is not read. Each mesh of glTF stands where the nodes put it.
-"""
+"""Readers of legacy VTK (datasets PolyData, versions 1 to 5) and, by trimesh, of binary glTF 2.0."""
 
 import os
 from collections.abc import Callable

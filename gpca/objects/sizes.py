@@ -58,15 +58,7 @@ def require_sizes(
     units: tuple[str, str],
     say: Remedies,
 ) -> None:
-    """Raise an InputError if the source and the target seem to have other units, or the target is no object.
-
-    Args:
-        subjects: names of source and target in messages.
-        extents: diagonals of their boxes, each in its own unit.
-        diameter: of the target.
-        units: of source and target.
-        say: how the user sets the units.
-    """
+    """Raise an InputError if the units of source and target seem to differ by these extents, or for no object."""
     size_m, target_m = (size * meters_per(unit) for size, unit in zip(extents, units, strict=True))
     ratio = size_m / target_m if target_m > 0 else 1.0
     differ = not 1 / LARGEST_RATIO <= ratio <= LARGEST_RATIO

@@ -1,8 +1,4 @@
-"""Configured sources of objects: where their data is, and their surfaces.
-
-A kind of source is a module with ``from_entry(entry, folder) -> Iterator[Surface]``; with ``require_entry(entry,
-folder)`` it can refuse an entry when a workflow loads. Plugins list kinds in ``SOURCES``, each with its module.
-"""
+"""Configured sources of objects: where their data is, and their surfaces."""
 
 import errno
 import os
@@ -40,11 +36,7 @@ RESTORE = "restore it: git checkout -- data"
 
 
 def resolve(entry: dict, data_dir: str | None) -> dict:
-    """Return an entry with an `origin`: "procedural", "local" (then with an absolute `location`) or "download".
-
-    No data is read. Data under `data_dir` comes first, then the repository's own, then the entry's `url` or `urls`. A
-    `location` counts if it exists; without one, each pattern of `files` must match.
-    """
+    """Return an entry with an `origin`: "procedural", "local" (data_dir's, else ours, at `location`) or "download"."""
     subject = f"source '{entry.get('title', entry.get('kind'))}'"
     if data_dir is not None and not require_place(data_dir).is_dir():
         raise InputError(data_dir, "no such folder", "correct data_dir in the config")

@@ -68,10 +68,7 @@ FEWEST_ZEROS = 2  # rows (0, 0, 0) that are no points; a single one may be
 
 
 def measured(points: np.ndarray, role: object, notes: list[str] | None = None) -> np.ndarray:
-    """Return the rows (n, 3) that hold a measurement, and add a note on the others; InputError if none does.
-
-    Depth cameras write NaN or (0, 0, 0) where depth is missing.
-    """
+    """Return the rows (n, 3) without NaN or missing depth, (0, 0, 0), with a note on others; InputError for none."""
     infinite_N = ~np.isfinite(points).all(axis=1)
     zero_N = ~points.any(axis=1)
     zero_N &= zero_N.sum() >= FEWEST_ZEROS
@@ -88,11 +85,7 @@ def measured(points: np.ndarray, role: object, notes: list[str] | None = None) -
 
 
 def as_points(cloud: Any, role: str, notes: list[str] | None = None) -> np.ndarray:
-    """Return the points (n, 3) float64 of an array, a list, a tensor, or a cloud of Open3D, old or new, of this role.
-
-    Rows without a measurement are left out, with a note (:func:`measured`).
-    Open3D is not imported: its clouds are recognized by ``points`` or ``point.positions``.
-    """
+    """Return the measured points (n, 3) float64 of an array, a list, a tensor, or Open3D's cloud, not imported."""
     values = cloud
     if not isinstance(cloud, np.ndarray):
         if hasattr(cloud, "points"):  # of open3d.geometry.PointCloud, and of trimesh's scans

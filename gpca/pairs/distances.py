@@ -221,11 +221,7 @@ MOVED = slice(-MOTION, -FIT)
 
 
 def describe_registrations(registrations: Registrations, *axes: object, points: int) -> dict[str, np.ndarray]:
-    """Return the groups of `WIDTHS`, each (N, F), of N registrations, and the features of so many of their points.
-
-    Relations do not depend on which object it is; densities are logarithms of spacing and extent of the observed cloud
-    relative to the model's. The axes name the draws of points, with split and number of a sample.
-    """
+    """Return the groups of `WIDTHS`, each (N, F), of N registrations, and the features of so many of their points."""
     rows = []
     for row in progress(range(len(registrations)), "descriptions of pairs"):
         random = generator(*axes, "pair", registrations.split[row], registrations.sample[row])

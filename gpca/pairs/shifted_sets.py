@@ -1,8 +1,4 @@
-"""Samples like and unlike those of the training, embedded, and their distances to the training samples.
-
-Two encoders, each with training samples of its own: the source's encoder, and one that never saw some of the objects.
-Learners fitted to the training samples of an encoder explain the test samples of its sets.
-"""
+"""Samples like and unlike those of the training, embedded, and their distances to the training samples."""
 
 from dataclasses import dataclass
 from typing import Any

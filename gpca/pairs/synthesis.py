@@ -111,10 +111,7 @@ READINGS: tuple[str, ...] = get_args(Reading)
 
 
 def read_as(reading: str, registrations: Registrations, icp: ICPSettings) -> Registrations:
-    """Return the registrations with the clouds that the encoder sees, which the paper leaves open.
-
-    ``aligned`` is the observed cloud after ICP, ``observed`` before it, ``reversed`` aligned by ICP from the model.
-    """
+    """Return the registrations with the clouds that the encoder sees, which the paper leaves open."""
     if reading == "aligned":
         return registrations
     if reading == "observed":

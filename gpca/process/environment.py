@@ -1,7 +1,4 @@
-"""What this machine lacks: Python packages of extras, and the system libraries that Open3D needs.
-
-``python -m gpca.process.environment`` checks it, as ``make`` does after installing ``environment.lock``.
-"""
+"""What this machine lacks: Python packages of extras, and the system libraries that Open3D needs."""
 
 from __future__ import annotations
 

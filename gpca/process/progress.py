@@ -15,10 +15,7 @@ _interrupted = False
 
 
 def progress(items: Iterable[Item], title: str, **options) -> Iterator[Item]:
-    """Iterate with a progress bar on a terminal, and with a line every ten seconds in a log file.
-
-    Work that ends before the first update prints nothing. Where Ctrl-C was lost, the next item raises it again.
-    """
+    """Iterate with a progress bar on a terminal, and with a line every ten seconds in a log file."""
     from tqdm import tqdm
 
     interval_s = 0.2 if sys.stderr.isatty() else 10.0

@@ -46,10 +46,7 @@ class TimeLeft:
             self._took_s += took_s
 
     def seconds(self) -> float:
-        """Return the expected seconds until the last job ends, at the speed of those that have ended.
-
-        It is the work per core, or the longest job. Running jobs count as a whole.
-        """
+        """Return the expected seconds of the work per core, or the longest job, at the speed so far."""
         longest_s = max(self._left.values(), default=0.0)
         return max(sum(self._left.values()) / self._cores, longest_s) * self._took_s / self._expected_s
 

@@ -98,11 +98,7 @@ def reenact_all(
     truth: CauseSettings,
     world: World | None = None,
 ) -> tuple[Reenactments, np.ndarray, np.ndarray]:
-    """Return the re-enactments of every row, the seconds (S,) that each took, and those of its registrations.
-
-    Of the causes it reads both clouds, the initial pose and what registrations found; rows are of whole objects by
-    default.
-    """
+    """Return the re-enactments of every row, the seconds (S,) that each took, and those of its registrations."""
     rows, seconds, icp_seconds = [], [], []
     for row in progress(range(len(causes)), f"re-enactments of {source}, seed {seed}"):
         started = perf_counter()

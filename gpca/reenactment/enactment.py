@@ -198,10 +198,7 @@ class Enactment:
 def reenact(
     pair: ObservedPair, settings: ReenactmentSettings, truth: CauseSettings, surface: ModelSurface | None = None
 ) -> list[Enactment]:
-    """Find hypotheses of the true pose and enact each, the most probable first.
-
-    Errors are up to the symmetries of the model, which what was observed under the first hypothesis completes.
-    """
+    """Find hypotheses of the true pose and enact each, the most probable first."""
     surface = surface or ModelSurface(pair.model)
     before = transform(pair.T_init, pair.observed)
     T_found_n = pair.T_runs @ inverse(pair.T_init)

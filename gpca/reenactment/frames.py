@@ -149,11 +149,7 @@ def reenact_frames(
     settings: ReenactmentSettings,
     truth: CauseSettings,
 ) -> Reenactments:
-    """Return the re-enactments of every row that :func:`gpca.causes.frames.measure_frames` made of these starts.
-
-    Of the instances it reads pixels, camera and what the dataset says of symmetries; of the causes, both clouds, the
-    initial pose and what registrations found.
-    """
+    """Return the re-enactments of every row that :func:`gpca.causes.frames.measure_frames` made of these starts."""
     object_S = instances.object_index[starts.instance] if len(starts) == len(causes) else np.array([])
     if not np.array_equal(object_S, causes.registrations.object_index):
         fault = "are of other registrations than the causes"

@@ -31,11 +31,7 @@ def reenact_scans(
     truth: CauseSettings,
     T_found_S: Sequence[np.ndarray] | None = None,
 ) -> Reenactments:
-    """Return the re-enactments of every row; of the causes it reads what may be observed.
-
-    The factors turn distances into errors. Found poses (k, 4, 4) of each row are where else the source may belong: what
-    global methods found takes it there from where the registration began.
-    """
+    """Return the re-enactments of every row; of the causes it reads what may be observed."""
 
     def world(pair: ObservedPair, row: int) -> list[Enactment]:
         found_k = None if T_found_S is None else T_found_S[row]

@@ -101,10 +101,7 @@ class ModelSurface:
         return np.sqrt(np.square(moved - points).sum(axis=2)).mean(axis=1)
 
     def completed(self, points: np.ndarray, noise: float) -> ModelSurface:
-        """Return the surface with noisy points (N, 3) of the part that the model lacks.
-
-        Errors are still means over the model's own points.
-        """
+        """Return the surface with noisy points (N, 3) of the part that the model lacks."""
         whole = ModelSurface(np.concatenate([self.points, points]))
         whole.center, whole.noise = (whole.points.min(axis=0) + whole.points.max(axis=0)) / 2, noise
         return whole

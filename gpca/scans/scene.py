@@ -64,10 +64,7 @@ class ScannedScene:
         return float(np.linalg.norm(np.ptp(np.stack(corners), axis=0)))
 
     def known(self) -> Iterator[Known]:
-        """Yield every pair with its pose and its overlap, published or measured as for 3DMatch (Huang et al. 2021).
-
-        This is the share of the target's points within `OVERLAP_M` of the source, of clouds thinned to voxels.
-        """
+        """Yield every pair with its pose and its overlap, published or measured as for 3DMatch (Huang et al. 2021)."""
         scale, thin = self.size_m / ROOM_M, dict[str, np.ndarray]()
         for pair in self.printed or (Known(*names) for names in combinations(self.scans, 2)):
             T_target_source = self._relative(pair)

@@ -90,10 +90,7 @@ def overall(
 def costs_of(
     area_of: Mapping[str, np.ndarray], calls_of: Mapping[str, int], methods: Mapping[str, Method]
 ) -> list[dict[str, Any]]:
-    """Return a point for each method with known ICP runs, the cheapest first: its place, as a share of both axes.
-
-    ``best`` are those that no method with as few runs surpasses.
-    """
+    """Return a point for each method with known ICP runs, the cheapest first: its place, as a share of both axes."""
     points: list[dict[str, Any]] = []
     counted = [name for name in area_of if calls_of[name] != NO_CALLS]
     for name in sorted(counted, key=lambda name: (calls_of[name], area_of[name][0])):

@@ -1,8 +1,4 @@
-"""The fixed samples of the tracks: cached, checked by hash, and made from the repository's data where missing.
-
-Each file is made in a process of its own, whose libraries are limited to the instructions of a run's jobs: the caller
-may have loaded NumPy with others, which round differently.
-"""
+"""The fixed samples of the tracks: cached, checked by hash, and made from the repository's data where missing."""
 
 from __future__ import annotations
 

@@ -95,10 +95,7 @@ def groups_of(published: Published) -> Iterator[Group]:
 def measured_of(
     published: Published, methods: Mapping[str, Method], chosen: np.ndarray, draws: Clustered
 ) -> dict[str, tuple[Arrays, Arrays]]:
-    """Return each method's measures (1 + B,) of rows by name, and masks of the samples that each counts.
-
-    A method that lacks scores for some of the rows is left out.
-    """
+    """Return each method's measures (1 + B,) of rows by name, and masks of the samples that each counts."""
     methods = {name: method for name, method in methods.items() if np.isfinite(method.scores[chosen]).all()}
     weights_B_N = draws.weights * draws.once
     if published.track.name == HARD_TRACK:
