@@ -118,18 +118,14 @@ def camera_values(focal_px=150.0, u=79.5, v=59.5, y=150.0, below=0, last=(0, 0, 
 CAMERAS = {
     "no focal length": ("cam_K", camera_values(0), "focal lengths 0 and 150 px"),
     "negative focal length": ("cam_K", camera_values(-150), "focal lengths -150 and 150 px"),
-    "huge focal length": ("cam_K", camera_values(1e200), "focal lengths 1e+200 and 150 px"),
     "NaN": ("cam_K", camera_values(math.nan), "NaN is not a number"),
-    "infinity": ("cam_K", camera_values(u=-math.inf), "-Infinity is not a number"),
     "rotated": ("cam_K", camera_values(below=3.0), "is not a camera matrix"),
     "principal point on the moon": ("cam_K", camera_values(u=1e9), "principal point outside any image"),
     "eight numbers": ("cam_K", camera_values()[:8], "cam_K has 8 numbers, not 9"),
     "a number for a list": ("cam_K", 150.0, "cam_K has 1 numbers, not 9"),
     "numbers as words": ("cam_K", ["150", *camera_values()[1:]], "cam_K contains '150', which is not a number"),
     "scale zero": ("depth_scale", 0, "depth_scale is 0"),
-    "scale infinite": ("depth_scale", math.inf, "Infinity is not a number"),
     "scale huge": ("depth_scale", 1e30, "depth_scale is 1e+30"),
-    "scale a list": ("depth_scale", [0.1], "depth_scale contains [0.1], which is not a number"),
 }
 
 
@@ -138,11 +134,8 @@ POSES = {
     "R scaled": ("cam_R_m2c", [1.01, 0, 0, 0, 1.01, 0, 0, 0, 1.01], "not orthogonal or not of unit length"),
     "R mirrored": ("cam_R_m2c", [-1, 0, 0, 0, 1, 0, 0, 0, 1], "it is mirrored: its determinant is -1"),
     "R a quaternion": ("cam_R_m2c", [0, 0, 0, 1], "cam_R_m2c has 4 numbers, not 9"),
-    "t of NaN": ("cam_t_m2c", [0, 0, math.nan], "NaN is not a number"),
     "t beyond sight": ("cam_t_m2c", [0, 0, 1e12], "cam_t_m2c is 1e+12 mm"),
-    "t of two": ("cam_t_m2c", [0, 700], "cam_t_m2c has 2 numbers, not 3"),
     "id a fraction": ("obj_id", 1.5, "obj_id is 1.5"),
-    "id huge": ("obj_id", 10**30, "obj_id is 1e+30"),
     "id a way out": ("obj_id", "../../1", "obj_id contains '../../1'"),
 }
 
@@ -157,18 +150,15 @@ def test_a_camera_or_an_annotation_that_cannot_be(damaged, name):
 
 TRUTHS = {
     "a list": ("[]", "its top level is not an object"),
-    "nothing": ("", "is empty"),
     "half": ('{"0": [{"obj_id": 1', "is not a scene's JSON file"),
     "no UTF-8": (b'{"\xff": []}', "is not a scene's JSON file ('utf-8' codec"),
     "deep lists": ('{"0": ' + "[" * 100_000 + "]" * 100_000 + "}", "nested too deep"),
     "an image twice": ('{"0": [], "0": []}', "key '0' appears twice"),
     "an image twice in other words": ('{"0": [], "00": []}', "image 0 occurs twice"),
     "a negative image": ('{"-1": []}', "its key '-1' is not an image number"),
-    "an image in other digits": ('{"١": []}', "is not an image number"),
     "a map of objects": ('{"0": {"1": 2}}', "image 0 has no list of objects"),
     "a word for an object": ('{"0": ["obj_id"]}', "image 0, object 0: has no cam_R_m2c"),
     "an image that is not there": ('{"7": []}', "has no image 7"),
-    "a pose twice": ('{"0": [{"obj_id": 1, "obj_id": 2}]}', "key 'obj_id' appears twice"),
 }
 
 
@@ -189,7 +179,6 @@ INSTEAD = {
     "folder": (Path.mkdir, "is a folder"),
     "pipe": (os.mkfifo, "is a device, pipe"),
     "loop": (lambda path: path.symlink_to(path.name), "cannot be read"),
-    "dead link": (lambda path: path.symlink_to("nowhere"), "no such"),
 }
 
 

@@ -32,30 +32,21 @@ def halves(path):
     path.write_bytes(content[: len(content) // 2])
 
 
-def postscript(path):
-    path.write_bytes(b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 160 120\n%%EndComments\nshowpage\n%%EOF\n")
-
-
 def bomb(side, mode="I;16"):
     return lambda path: Image.new(mode, (side, side)).save(path, compress_level=1)
 
 
 IMAGES = {
     "depth of 8 bits": (DEPTH, lambda p: save(p, (FLAT / 30).astype(np.uint8)), "is 8-bit depth: 16 bits expected"),
-    "depth of a palette": (
-        DEPTH, lambda p: Image.fromarray(COLOURS).quantize(16).save(p), "is 8-bit depth: 16 bits expected"
-    ),
     "depth of colours": (DEPTH, lambda p: save(p, COLOURS), "is a color image, not depth"),
     "no depth anywhere": (DEPTH, lambda p: save(p, 0 * FLAT), "has no depth: every pixel is 0"),
     "NaN depth": (DEPTH, as_tiff(np.full(SHAPE, np.nan, np.float32)), "has no depth: every pixel is 0"),
     "negative depth": (DEPTH, as_tiff(np.full(SHAPE, -0.7, np.float32)), "contains negative or infinite depth"),
     "depth cut": (DEPTH, halves, "is truncated or not a readable image"),
-    "depth a script": (DEPTH, postscript, "is truncated or not a readable image"),
     "depth a bomb": (DEPTH, bomb(8500), "too many for a frame"),
     "depth turned": (DEPTH, lambda p: save(p, FLAT.T), "is 160×120 but depth is 120×160"),
     "mask small": (MASK, lambda p: save(p, np.full((60, 80), 255, np.uint8)), "is 80×60 but depth is 160×120"),
     "mask a bomb": (MASK, bomb(13_500, "L"), "too many for a frame"),
-    "mask of text": (MASK, lambda p: p.write_text("255"), "is truncated or not a readable image"),
     "mask a picture": (MASK, lambda p: save(p, COLOURS), "is not a mask: most of its pixel values differ"),
     "mask everywhere": (MASK, lambda p: save(p, np.full(SHAPE, 255, np.uint8)), "lie", "masks"),
 }  # fmt: skip
@@ -108,14 +99,6 @@ def beside(entry):
     entry["cam_t_m2c"][0] += 30
 
 
-def untold(entry):
-    entry["cam_R_m2c"] = np.eye(3).ravel().tolist()
-
-
-def depth_scale(factor):
-    return lambda camera: camera.update(depth_scale=factor * camera["depth_scale"])
-
-
 def outside(camera):
     camera["cam_K"][2] = 1000.0
 
@@ -124,10 +107,8 @@ PLACES = {
     "t in metres": (every("gt", scaled(1e-3)), "half of its measured points lie"),
     "one t of zeros": (of_one(scaled(0)), "check cam_R_m2c and cam_t_m2c (from model to camera, row by row"),
     "OpenGL": (every("gt", to_opengl), "y down and z forward"),
-    "scale in metres": (every("camera", depth_scale(1e-3)), "depth_scale"),
     "centre outside": (every("camera", outside), "cam_K"),
     "30 mm beside": (every("gt", beside), "above the limit of 3 % or 4 mm, whichever is more; check cam_R_m2c"),
-    "R left out": (every("gt", untold), "above the limit of 3 % or 4 mm"),
 }
 
 

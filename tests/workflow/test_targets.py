@@ -38,14 +38,11 @@ def test_a_table_asked_for_alone_needs_no_figure_and_no_other_explainer(project)
 
 NEEDS = {  # a table: what is made for it, and what is not
     "table3_active_learning": ("embeddings/ycb active_learning/ycb", "uncertainty/ predictions causes/ real_rgbd"),
-    "table4_kernels": ("objects/ycb embeddings/ycb kernels/ycb", "coffee_cup predictions uncertainty/ real_rgbd"),
     "table5_learners": ("embeddings/coffee_cup shifted/ycb learners/ycb", "predictions uncertainty/ causes/ real_rgbd"),
     "table6_backbones": ("scenes/ instances/ predictions/real_rgbd", "uncertainty/ causes/ model.pt"),
     "table7_runtime": ("model_causes/ycb model.pt runtime.csv", "predictions uncertainty/ diagnoses/ learners"),
     "table8_recovery": ("recovery/ recovery.csv", "objects/ registrations encoders predictions model.pt"),
-    "table11_registration": ("registrations/ycb methods/ycb", "encoders embeddings uncertainty/ predictions causes/"),
     "table12_uncertainty": ("causes/ycb estimates/ycb", "registrations encoders embeddings uncertainty/ predictions"),
-    "table14_method_matrix": ("encoders/ycb exchange/", "coffee_cup predictions uncertainty/ causes/ embeddings"),
     "table19_guarantee": (
         "reenactments/ycb diagnoses/ycb/gpca frame_diagnoses/ guarantee/reenact",
         "predictions estimates learning_curve controls/ uncertainty/ model.pt",
@@ -66,7 +63,6 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
         "predictions/ycb/shap_additive predictions/ycb/softmax_head diagnoses/ycb/gate_rmse fig3_concepts",
     ),
     "gpca/steps/shift.py": ("shifted/ learners/ table5_shift", "predictions active_learning diagnoses/ model.pt"),
-    "baselines/heads.py": ("learners/ table5_learners", "shifted/ predictions diagnoses/ kernels"),
     "gpca/experiments/kernel_grid.py": (
         "figures/kernel_learning_curves kernels.csv table4_grid",
         "kernels/ figures/fig3",
@@ -75,21 +71,15 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
         "active_learning/ycb frame_labels/ runtime.csv table6_labels",
         "predictions embeddings learners diagnoses/ model.pt kernels/",
     ),
-    "gpca/active_learning/stream.py": ("active_learning/ycb table3_stream", "predictions embeddings learners"),
     "gpca/alignment/icp_kernels.py": (
         "uncertainty/ycb/additive predictions/ycb/shap_additive causes/ycb methods/ycb estimates/ycb model.pt recovery",
         "registrations/ encoders/ycb embeddings/ycb predictions/ycb/gpca/ active_learning/ table2_per_concept kernels",
     ),
-    "gpca/alignment/methods/teaser.py": ("methods/ycb table11_severity", "causes/ycb predictions estimates exchange"),
-    "gpca/experiments/registration_methods.py": ("table11_registration table11_severity", "methods/ figures/fig"),
     "baselines/aligned_source.py": (
         "predictions/ycb/softmax_head recovery/ controls/",
         "predictions/ycb/gpca predictions/ycb/shap_additive learners embeddings model.pt gate_rmse",
     ),
-    "gpca/reporting/figures/contact_sheet.py": ("objects_coffee_cup objects_ycb", "objects/ tables/ fig4_pipeline"),
-    "gpca/encoders/reduction.py": ("dgcnn/pca predictions/real_rgbd/dgcnn-pca", "encoders predictions/ycb model.pt"),
     "gpca/frames/synthesis.py": ("poses/ embeddings/real_rgbd model.pt", "scenes instances predictions/ycb causes/"),
-    "gpca/frames/bop.py": ("scenes/ instances/ frame_causes/ recovery/", "predictions/ycb encoders/ycb causes/ycb"),
     "gpca/causes/policy.py": ("model.pt runtime.csv recovery/ table8_recovery", "predictions encoders diagnoses/"),
     "gpca/experiments/concept_attribution.py": (
         "table1_extended table2_per_concept",
@@ -100,7 +90,6 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
         "control_embeddings/ table2_per_concept",
         "registrations uncertainty/ causes/ descriptors predictions/real_rgbd/gpca_pair residuals_forest methods/",
     ),
-    "gpca/objects/point_files.py": ("runtime.csv", "objects/ predictions embeddings registrations"),
     "gpca/objects/procedural.py": (
         "objects/coffee_cup objects/ycb registrations/coffee_cup predictions/coffee_cup objects_coffee_cup scenes",
         "",
@@ -109,10 +98,7 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
         "descriptors/ycb diagnoses/ycb/pair_forest estimates/ model.pt repairs/causes/",
         "predictions smoke/causes/ model_causes/ recovery methods/",
     ),
-    "gpca/uncertainty/estimators/analytic.py": ("estimates/ exchange/ estimators.csv", "uncertainty/ causes/ methods/"),
-    "baselines/descriptors.py": ("diagnoses/ycb/pair_forest table9_causes", "predictions"),
     "gpca/steps/control_samples.py": ("controls/ control_embeddings/ loophole", "predictions embeddings encoders"),
-    "gpca/experiments/controls.py": ("controls.csv table10_controls loophole", "controls/ predictions diagnoses/"),
     "gpca/uncertainty/estimators/substitute.py": ("exchange/ table14_method_matrix", "estimates/ methods/ predictions"),
 }
 

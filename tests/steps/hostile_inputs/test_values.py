@@ -31,16 +31,13 @@ def same(array):
 VALUES = {
     # What cannot be of objects
     ("objects.npz", "negative diameter", "diameter"): {"diameters_m": lambda d: -d},
-    ("objects.npz", "diameter of nothing", "diameter"): {"diameters_m": at(1, value=0.0)},
     ("objects.npz", "diameter in millimetres", "diameter"): {"diameters_m": lambda d: 1e3 * d},
-    ("objects.npz", "huge diameter", "diameters_m"): {"diameters_m": lambda d: 1e300 * d},
     ("objects.npz", "diameter of another object", "span"): {"diameters_m": at(0, value=5.0)},
     ("objects.npz", "points in millimetres", "span"): {"points_m": lambda p: 1e3 * p},
     ("objects.npz", "huge points", "points_m"): {"points_m": lambda p: p.astype(float) * 1e200},
     ("objects.npz", "one huge point", "span"): {"points_m": at(7, 0, value=1e9)},
     ("objects.npz", "all points equal", "span 0 m"): {"points_m": same},
     ("objects.npz", "complex points", "complex"): {"points_m": lambda p: p + 1j},
-    ("objects.npz", "points of text", "type <U"): {"points_m": lambda p: p.astype(str)},
     ("objects.npz", "points of dates", "type datetime"): {"points_m": lambda p: p.astype("datetime64[s]")},
     ("objects.npz", "points of half precision", "float16, not float32 or float64"): {
         "points_m": lambda p: p.astype(np.float16)
@@ -49,7 +46,6 @@ VALUES = {
     ("objects.npz", "a name of two lines", "does not fit on one line"): {"names": at(1, value="a\nb")},
     ("objects.npz", "points far from the origin", "centered"): {"points_m": lambda p: p + 5},
     ("objects.npz", "normals of no length", "normal"): {"normals": lambda n: 0 * n},
-    ("objects.npz", "long normals", "normal"): {"normals": lambda n: 2 * n},
     ("objects.npz", "two of one name", "the same name"): {"names": lambda n: n[[0, 0, 2]]},
     ("objects.npz", "names of numbers", "names"): {"names": lambda n: np.arange(len(n))},
     ("objects.npz", "offsets of halves", "offsets"): {"offsets": lambda o: o + 0.0},
@@ -61,8 +57,6 @@ VALUES = {
     # of registrations
     ("registrations.npz", "clouds in millimetres", "'points'"): {"points": lambda p: p * 1e6},
     ("registrations.npz", "huge targets", "target_points"): {"target_points": lambda p: p.astype(float) * 1e200},
-    ("registrations.npz", "complex clouds", "complex"): {"points": lambda p: p + 1j},
-    ("registrations.npz", "negative diameters", "diameter_m"): {"diameter_m": lambda d: -d},
     ("registrations.npz", "a fitness above 1", "fitness"): {"fitness": lambda f: f + 1.5},
     ("registrations.npz", "a negative RMSE", "inlier_rmse"): {"inlier_rmse": lambda r: r - 9},
     ("registrations.npz", "a mirrored pose", "T_target_source_icp"): {"T_target_source_icp": at(0, 0, value=-1.0)},
@@ -72,8 +66,6 @@ VALUES = {
     ("registrations.npz", "a negative sample", "sample"): {"sample": at(0, value=-1)},
     ("registrations.npz", "an object before the first", "object_index"): {"object_index": at(0, value=-1)},
     ("registrations.npz", "a negative severity", "severity_noise"): {"severity_noise": lambda s: s - 1},
-    ("registrations.npz", "names of numbers", "concept"): {"concept": lambda c: np.arange(len(c))},
-    ("registrations.npz", "offsets of halves", "offsets"): {"offsets": lambda o: o + 0.5},
     ("registrations.npz", "an unknown split", "the split 'tset', which is neither"): {"split": at(3, value="tset")},
     ("registrations.npz", "an object without a name", "a name that is empty"): {"object_name": at(3, value=" ")},
     ("registrations.npz", "poses of long doubles", "type float128, not float32 or float64"): {
@@ -81,16 +73,12 @@ VALUES = {
     },
     # of embeddings
     ("embeddings.npz", "half precision", "float16"): {"h": lambda h: h.astype(np.float16)},
-    ("embeddings.npz", "long doubles", "float128"): {"h": lambda h: h.astype(np.longdouble)},
     ("embeddings.npz", "bytes of another order", "type >f8"): {"h": lambda h: h.astype(">f8")},
-    ("embeddings.npz", "an unknown split", "the split 'tset', which is neither"): {"split": at(3, value="tset")},
-    ("embeddings.npz", "complex numbers", "complex"): {"h": lambda h: h + 1j},
     ("embeddings.npz", "huge numbers", "above 1e+15"): {"h": lambda h: h * 1e200},
     ("embeddings.npz", "infinity", "infinity"): {"h": at(3, 3, value=np.inf)},
     ("embeddings.npz", "no samples", "no training"): {
         "h": lambda h: h[:0], "head_logits": lambda h: h[:0], "sample": lambda s: s[:0], "split": lambda s: s[:0],
     },
-    ("embeddings.npz", "samples of halves", "sample"): {"sample": lambda s: s + 0.5},
     # of outcomes
     ("uncertainty.npz", "other samples", "conditions.csv: its samples differ"): {"sample": lambda s: s + 1000},
     ("uncertainty.npz", "other conditions", "conditions"): {
