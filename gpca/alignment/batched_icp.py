@@ -1,9 +1,4 @@
-"""ICP of one source to one target from many initial poses, with everything that the runs share computed once.
-
-Point-to-point runs are a compiled loop with Open3D's steps and stopping rule, which ends at Open3D's poses
-(docs/protocol.md#two-loops-of-icp). Open3D builds a tree of the target for every initial pose and searches it for
-every point in every iteration. :class:`BatchedPlaneICP` takes all point-to-plane runs one step at a time.
-"""
+"""ICP of one source to one target from many poses: compiled loops, as Open3D's (docs/protocol.md#two-loops-of-icp)."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -72,10 +67,7 @@ def make_target(points: np.ndarray, distance: float) -> Target:
 
 
 class BatchedICP:
-    """ICP to one target (P, 3), in any unit, which the results and the correspondence distance share.
-
-    Point-to-plane and generalized ICP need normals (P, 3). Fewer than three points or NaN raise an InputError.
-    """
+    """ICP to one target (P, 3), in any unit; point-to-plane and generalized ICP need normals (P, 3)."""
 
     def __init__(self, target: np.ndarray, settings: ICPSettings, target_normals: np.ndarray | None = None) -> None:
         require_cloud("target cloud", target)
@@ -89,10 +81,7 @@ class BatchedICP:
     def register(
         self, source: np.ndarray, T_target_source_init_n: np.ndarray, max_iterations: int | None = None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Align `source` (N, 3) from poses (n, 4, 4): T_target_source (n, 4, 4), fitness (n,), inlier RMSE (n,).
-
-        `max_iterations` overrides the settings' limit of point-to-point runs; 0 only measures the poses of any method.
-        """
+        """Align `source` (N, 3) from poses (n, 4, 4): poses, fitness, inlier RMSE (n,); 0 iterations only measure."""
         require_cloud("source cloud", source)
         poses_n = np.array(T_target_source_init_n, np.float64)
         if self._settings.method == "point_to_point":
@@ -120,8 +109,7 @@ def pulls(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the mean of [y × r, r] (n, 6) over correspondences of `source` (N, 3), fitness (n,) and RMSE (n,).
 
-    r = y - q is the offset of the moved point y from its neighbor q; the mean is half the gradient of the mean of |r|²
-    by a twist on the left of each pose (n, 4, 4).
+    r = y - q is the offset of the moved point y from its neighbor q, and the mean half the gradient of that of |r|².
     """
     n = len(T_target_source_n)
     pulls_n_6, fitness_n, rmse_n = np.empty((n, 6)), np.empty(n), np.empty(n)
@@ -131,10 +119,7 @@ def pulls(
 
 
 class BatchedPlaneICP:
-    """ICP to the planes of one target (P, 3) with normals; the correspondence distance is in the unit of the points.
-
-    Generalized ICP takes planes of the source as well, by its normals (N, 3).
-    """
+    """ICP to the planes of one target (P, 3) with normals; generalized ICP takes planes of the source too."""
 
     def __init__(self, target: np.ndarray, target_normals: np.ndarray, settings: ICPSettings) -> None:
         require_cloud("target cloud", target)

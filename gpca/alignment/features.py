@@ -12,10 +12,7 @@ MOST_NEIGHBORS = 100
 
 
 def estimate_normals(points_N_3: np.ndarray, neighbors: int = NEIGHBORS) -> np.ndarray:
-    """Return unit normals (N, 3) that point away from the center of the cloud.
-
-    This is outward on a convex object, and otherwise at least the same side in two clouds of one object.
-    """
+    """Return unit normals (N, 3) that point away from the center of the cloud: outward on a convex object."""
     cloud = open3d_cloud(points_N_3)
     cloud.estimate_normals(require_open3d().geometry.KDTreeSearchParamKNN(neighbors))
     normals_N_3 = np.array(cloud.normals)

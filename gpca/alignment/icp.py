@@ -37,10 +37,7 @@ class Registration:
 
 
 class ICP:
-    """Open3D's ICP of many sources to one target (P, 3), in any unit; the correspondence distance is in it too.
-
-    Other methods than point-to-point need normals (P, 3); point-to-plane can take one of Open3D's robust kernels.
-    """
+    """Open3D's ICP to one target (P, 3), in any unit, perhaps with a robust kernel; planes need normals (P, 3)."""
 
     def __init__(
         self, target: np.ndarray, target_normals: np.ndarray | None, settings: ICPSettings, kernel: Any = None

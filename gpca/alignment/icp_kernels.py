@@ -163,10 +163,7 @@ def _reached(low, cell, x, y, z, window):
 
 @njit(ahead=f"d2 {TARGET} d3 d1 d1 l d", cache=True)
 def align_all(source, target, poses, fitness, rmse, max_iterations, converged):
-    """Align the source (N, 3) from every pose (n, 4, 4), in place; fill fitness (n,) and inlier RMSE (n,).
-
-    A run has converged where both change by less than `converged`.
-    """
+    """Align the source (N, 3) from every pose (n, 4, 4), in place, until fitness (n,) and inlier RMSE (n,) rest."""
     room = np.empty(LISTED)
     moments, matrices = np.empty((4, 4)), np.empty((8, 4))
     neighbor = np.empty(len(source), np.int64)
@@ -187,10 +184,7 @@ def align_all(source, target, poses, fitness, rmse, max_iterations, converged):
 
 @njit(ahead=f"d2 {TARGET} d3 d2 d1 d1", cache=True)
 def pull_all(source, target, poses, pulls, fitness, rmse):
-    """At every pose (n, 4, 4), fill the mean of [y × r, r] (n, 6) over correspondences, r = y - q of the moved source.
-
-    That is half of the gradient of the mean square of r by a twist on the left of the pose.
-    """
+    """At every pose (n, 4, 4), fill the mean of [y × r, r] (n, 6) over correspondences, r = y - q of moved points."""
     room, moments = np.empty(LISTED), np.empty((4, 4))
     neighbor, held = np.empty(len(source), np.int64), np.zeros((len(source), 4))
     for n in range(len(poses)):

@@ -54,11 +54,7 @@ def displacements(T_n: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 class PoseErrors:
-    """Errors of many estimates of one object's pose, where the truth is the identity; ADD-S if symmetric.
-
-    They are averaged over the first `judged` points, but nearest neighbors are sought among all of them, because ADD-S
-    cannot fall below their spacing.
-    """
+    """Errors of estimates where the truth is the identity, over the first `judged` points; neighbors among all."""
 
     def __init__(self, points_N_3: np.ndarray, judged: int, symmetric: bool) -> None:
         from scipy.spatial import cKDTree

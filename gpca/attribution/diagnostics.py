@@ -29,10 +29,7 @@ def excess_aurc(confidence_S: np.ndarray, wrong_S: np.ndarray) -> float:
 
 
 def augrc(confidence_S: np.ndarray, wrong_S: np.ndarray) -> float:
-    """Return the area under the generalized risk, errors among the k most confident over S (Traub et al. 2024).
-
-    At error rate e it is about e² / 2 at best, e / 2 in random order.
-    """
+    """Return the area under the generalized risk, errors among the k most confident over S (Traub et al. 2024)."""
     return float(_cumulative_errors(confidence_S, wrong_S).mean() / len(wrong_S))
 
 

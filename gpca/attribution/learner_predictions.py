@@ -19,11 +19,7 @@ SCORES = ("max_score", "entropy", "bald", "variance")  # not every learner has t
 
 
 def read_learner_predictions(prediction_files: Iterable[str | Path], set_files: Iterable[str | Path] = ()) -> dict:
-    """(source, learner, seed) -> rows of predictions, with the uncertainties `SCORES`, higher where less sure.
-
-    Files are named `…/{source}/{learner}/seed{seed}.csv` and `…/{source}/seed{seed}.npz`; the `DISTANCES` of the latter
-    become columns of the rows.
-    """
+    """(source, learner, seed) -> rows of predictions, with uncertainties `SCORES` and `DISTANCES` of the set files."""
     import pandas as pd
 
     distances = {}

@@ -1,7 +1,4 @@
-"""From predictions to numbers: over the test rows of every source, explainer and seed, as one tidy table.
-
-An abstained sample counts as wrong, so that an explainer cannot gain by staying silent.
-"""
+"""From predictions to tidy numbers of every source, explainer and seed; an abstained sample counts as wrong."""
 
 from __future__ import annotations
 
@@ -43,11 +40,7 @@ def confusion(
 
 
 def permuted_accuracy(confusion_C_C1: np.ndarray) -> float:
-    """Return the largest accuracy over all one-to-one relabelings of the predicted concepts (Kuhn 1955).
-
-    Far above the plain accuracy it shows that an explainer tells the concepts apart but names them wrongly. It looks at
-    the truth, so it is an upper bound: of many balanced guesses it is slightly above 1/C.
-    """
+    """Return the largest accuracy over all one-to-one relabelings of the predicted concepts (Kuhn 1955), a bound."""
     from scipy.optimize import linear_sum_assignment
 
     named_C_C = confusion_C_C1[:, :-1]
@@ -69,11 +62,7 @@ def read_causal(path: str | Path) -> pd.Series:
 
 
 def collect(prediction_files: Iterable[str | Path], causal_files: Iterable[str | Path] = ()) -> pd.DataFrame:
-    """Return the tidy metrics (results/README.md) of prediction files named `…/{source}/{explainer}/seed{seed}.csv`.
-
-    Causal metrics are those of the sources and seeds of `causal_files`, named `…/{source}/{design}/seed{seed}.csv`;
-    they may hold more samples than an explainer explains.
-    """
+    """Return tidy metrics of `…/{source}/{explainer}/seed{seed}.csv`, causal ones for those of `causal_files`."""
     causal = {}
     for path in causal_files:
         source, _, seed = source_method_seed(path)

@@ -1,7 +1,4 @@
-"""The files with one row per sample: an explainer's prediction, and the seconds that it took.
-
-They are written with six decimals and read as text first, so that only numbers pass for numbers.
-"""
+"""The files with one row per sample: an explainer's prediction, and the seconds that it took."""
 
 from __future__ import annotations
 
@@ -56,10 +53,7 @@ def _columns(registrations: Registrations, attribution: Attribution) -> dict[str
 
 
 def read_predictions(path: str | Path, labels: Sequence[str] = ()) -> Frame:
-    """Read a prediction file as text, but for `score_…`, `variance_…` and `icp_calls` (numbers) and `abstained` (bool).
-
-    A sample may occur once for each combination of entries of the `labels`, columns before its own.
-    """
+    """Read a prediction file, numbers and flags as such; a sample stands once for each combination of `labels`."""
     rows = read_csv(path, (*labels, *PREDICTION_COLUMNS), _OF_CONCEPTS)
     rows["abstained"] = rows["abstained"] == "True"
     if unknown := set(rows["concept_true"]) - set(concepts := concepts_of(rows)):

@@ -1,9 +1,4 @@
-"""Multi-class Gaussian process classification by sparse variational inference (paper Sec. III-B).
-
-One latent GP per concept, shared inducing inputs, Cholesky variational posterior, softmax likelihood (Hensman et al.
-2015). A fit learns covariance, inducing inputs and posterior (:mod:`gpca.classifier.sparse_gp`); further labels then
-move the posterior alone (:mod:`gpca.classifier.latents`).
-"""
+"""Gaussian process classification by sparse variational inference (paper Sec. III-B; Hensman et al. 2015)."""
 
 from __future__ import annotations
 
@@ -39,10 +34,7 @@ class GPC:
         self._sites = Sites.silent(0, 0)  # before the first refinement
 
     def fit(self, h_N_d: np.ndarray, labels_N: np.ndarray, around_R_d: np.ndarray | None = None) -> GPC:
-        """Maximize the ELBO over variational parameters, inducing inputs and covariance parameters.
-
-        Standardization and start are those of `around_R_d`, by default the labeled embeddings.
-        """
+        """Maximize the ELBO; standardization and start are those of `around_R_d`, by default the labeled embeddings."""
         for _ in self.fit_up_to([self.settings.iterations], h_N_d, labels_N, around_R_d):
             pass
         return self
@@ -55,10 +47,7 @@ class GPC:
         around_R_d: np.ndarray | None = None,
         before: GPC | None = None,
     ) -> Iterator[int]:
-        """Yield each number of iterations in rising order; the classifier is then as :meth:`fit` would leave it.
-
-        The fit may start from the result of a classifier `before` of the same classes.
-        """
+        """Yield each number of iterations in rising order, fitted so far, perhaps from the result of another."""
         import torch
 
         from gpca.classifier.sparse_gp import SparseGPs, Start
@@ -156,10 +145,7 @@ class GPC:
         return self._latents.marginals(self.project(h_N_d))
 
     def attribute(self, h_N_d: np.ndarray | Projection) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return scores_N_C, variances_N_C and bald_N from M posterior draws (Eqs. 4, 5, 7).
-
-        All points share the same M·C standard normal numbers, so a point's result does not depend on the others.
-        """
+        """Return scores_N_C, variances_N_C, bald_N from M posterior draws, the same for all points (Eqs. 4, 5, 7)."""
         return summarize_marginals(*self.posterior(h_N_d), self._draws())
 
     def scores(self, h_N_d: np.ndarray | Projection) -> np.ndarray:

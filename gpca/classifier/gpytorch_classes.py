@@ -1,8 +1,4 @@
-"""The classifier in gpytorch's own classes, as in its tutorials, for comparison with :mod:`gpca.classifier.gpc`.
-
-Both start at the same place and draw the same random numbers in the same order, so their results agree within rounding
-(docs/baselines.md, ``tests/classifier/test_gpytorch_classes.py``).
-"""
+"""The classifier in gpytorch's own classes, with the same random numbers as :mod:`gpca.classifier.gpc`."""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -78,10 +74,7 @@ class LatentGPs(gpytorch.models.ApproximateGP):
 
 
 def ascend(model: LatentGPs, inputs_N_d: Tensor, targets_N: Tensor, learning_rate: float) -> Iterator[float]:
-    """Yield, without end, the loss before each step of Adam on the ELBO of all samples, in nats per sample.
-
-    Random numbers come from torch's global generator, which gpytorch requires.
-    """
+    """Yield, without end, the loss before each step of Adam on the ELBO, by torch's global random numbers."""
     n_classes = model.variational_strategy.num_tasks
     if len(targets_N) == n_classes:
         fault = f"{n_classes} samples for {n_classes} classes, which gpytorch's SoftmaxLikelihood would read transposed"

@@ -45,10 +45,7 @@ def _means(x_n_d: np.ndarray, cluster_n: np.ndarray, centers_k_d: np.ndarray) ->
 
 
 def kmeans_plusplus(x_n_d: np.ndarray, clusters: int, seed: int) -> list[int]:
-    """Return the rows of the first centers by k-means++ (Arthur and Vassilvitskii 2007), as scikit-learn chooses them.
-
-    Of some rows, drawn in proportion to the squared distance to the nearest center, the one that lowers the sum most.
-    """
+    """Return the rows of first centers by k-means++ (Arthur and Vassilvitskii 2007), as scikit-learn chooses them."""
     random = np.random.RandomState(seed)
     n, weight_n = len(x_n_d), np.ones(len(x_n_d), x_n_d.dtype)
     chosen = [int(random.choice(n, p=weight_n / weight_n.sum()))]

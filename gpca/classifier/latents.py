@@ -61,10 +61,7 @@ class Latents:
 
 @dataclass(frozen=True)
 class Sites:
-    """One Gaussian factor per labeled input and latent, in natural parameters; zeros carry no evidence.
-
-    The posterior is q(v) ∝ N(0, I) Π_n exp(linear_n f_n - precision_n f_n² / 2).
-    """
+    """Factors of labels: q(v) ∝ N(0, I) Π_n exp(linear_n f_n - precision_n f_n² / 2); zeros are no evidence."""
 
     linear_N_C: np.ndarray
     precision_N_C: np.ndarray
@@ -94,8 +91,7 @@ def refine(
     """Maximize the ELBO of the softmax likelihood by natural gradients; each iteration passes once over all labels.
 
     Conjugate-computation variational inference (Khan & Lin 2017): a step toward the sites with precision
-    E_q[p_c (1 - p_c)] and mean gradient E_q[1{y = c} - p_c]. It converges in some ten steps without a tuned rate, and
-    ends where no probability changes by the tolerance. Returns the sites, their posterior, and the iterations done.
+    E_q[p_c (1 - p_c)] and mean gradient E_q[1{y = c} - p_c]. Returns sites, their posterior, and the iterations done.
     """
     wanted_N_C = np.eye(sites.linear_N_C.shape[1])[targets_N]
     latents, normal_Q_1_C = sites.posterior(projection), _normal_points(wanted_N_C.shape[1])[:, None]

@@ -1,7 +1,4 @@
-"""The fitted prior of the sparse GP classifier, in double precision and without torch.
-
-It is the same for a run and for ``gpca explain``; :mod:`gpca.classifier.sparse_gp` fits it.
-"""
+"""The fitted prior of the sparse GP classifier, in double precision and without torch."""
 
 from __future__ import annotations
 
@@ -83,10 +80,7 @@ class Prior:
         return self._with_parameters(lambda values_C: np.append(values_C, _geometric_mean(values_C)))
 
     def level(self, labeled_C: np.ndarray) -> Prior:
-        """Give the covariances of classes without labels the geometric means of the labeled classes' parameters.
-
-        Without a label, a class's covariance has learned only how best to be wrong.
-        """
+        """Give covariances of classes without labels, which learned only to be wrong, the means of the others."""
         return self._with_parameters(
             lambda values_C: np.where(labeled_C, values_C, _geometric_mean(values_C[labeled_C]))
         )

@@ -78,10 +78,7 @@ class Attribution:
 
     @property
     def entropy_N(self) -> np.ndarray:
-        """Predictive entropy H[ŝ] in nats of the scores, normalized to sum to one.
-
-        Scores may be signed, as Shapley values are: a negative one has no share. Without any share all are equal.
-        """
+        """Predictive entropy in nats of the scores, normalized to sum to one; negative ones have no share."""
         positive_N_C = np.maximum(self.scores_N_C, 0)
         positive_N_C = np.where(positive_N_C.sum(axis=1, keepdims=True) > 0, positive_N_C, 1.0)
         return entropy(positive_N_C / positive_N_C.sum(axis=1, keepdims=True))
@@ -103,10 +100,7 @@ def summarize_draws(logits_M_N_C: np.ndarray) -> tuple[np.ndarray, np.ndarray, n
 def summarize_marginals(
     mean_N_C: np.ndarray, deviation_N_C: np.ndarray, normal_M_C: np.ndarray, block: int = 16
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Summarize draws mean + deviation · normal of independent latents, as :func:`summarize_draws` does.
-
-    All N points share the M·C numbers. A block of points fits the processor's cache.
-    """
+    """Summarize draws mean + deviation · normal, the same for all points, as :func:`summarize_draws` does."""
     parts = [_summarize(logits_C_N_M) for logits_C_N_M in _drawn(mean_N_C, deviation_N_C, normal_M_C, block)]
     scores_N_C, variances_N_C, bald_N = (np.concatenate(part) for part in zip(*parts, strict=True))
     return scores_N_C, variances_N_C, bald_N
@@ -140,11 +134,8 @@ def _probabilities(logits_C_N_M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _summarize(logits_C_N_M: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Do what :func:`summarize_draws` says, in the given array, as new ones would take most of the time.
-
-    Classes come first, as sums over three neighbors are several times as slow as sums of three arrays, and draws last,
-    so that a point's sums do not depend on how many others there are.
-    """
+    # In the given array, as new ones would take most of the time. Classes come first, as sums over three neighbors are
+    # slow, and draws last, so that a point's sums do not depend on how many others there are.
     p_C_N_M, total_N_M = _probabilities(logits_C_N_M)
     scores_C_N = p_C_N_M.mean(axis=2)
     # H[softmax(f)] = log Σ exp f - Σ p f: one logarithm per draw instead of one per class.

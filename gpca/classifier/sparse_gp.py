@@ -1,10 +1,4 @@
-"""Sparse GPs under variational inference, as a fit learns them: covariances, the start of a fit, and its ELBO.
-
-The objective is gpytorch's (``VariationalStrategy``, ``CholeskyVariationalDistribution``, ``SoftmaxLikelihood`` and
-``VariationalELBO`` with their defaults) from the same random numbers, several times faster: the C latents share the
-distances between inputs, and nothing is built for sizes that are fixed. :mod:`gpca.classifier.gpytorch_classes` is
-gpytorch's form, and ``tests/classifier/test_sparse_gp.py`` compares the two.
-"""
+"""Sparse GPs under variational inference: gpytorch's objective from the same random numbers, several times faster."""
 
 from __future__ import annotations
 

@@ -80,8 +80,7 @@ def add_registration_arguments(parser: ArgumentParser, given_pose: str) -> None:
 def run_explain(options: Namespace) -> int:
     """Read all files, then explain and print one source after the other; everything but results goes to stderr.
 
-    Files, except for those of a CSV, are read before heavy libraries are loaded, so that most mistakes are reported at
-    once. Returns 2 if a source or row of several has a fault, else the largest status of an explanation.
+    Returns 2 if a source or row of several has a fault, else the largest status of an explanation.
     """
     _require_options(options)
     path = None if options.scans else model_path(options.model)

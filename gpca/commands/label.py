@@ -1,8 +1,4 @@
-"""Command ``label``: a person names the causes of the registrations that the classifier is least sure of.
-
-They belong to a run, or to the queue of ``gpca explain --queue``, whose questions come from the model's own classifier.
-Answers may come from a file or a pipe. Each is saved before the next question, so that labeling can be continued.
-"""
+"""Command ``label``: a person names the causes of the registrations that the classifier is least sure of."""
 
 from __future__ import annotations
 

@@ -17,9 +17,5 @@ def add_repair_arguments(parser: ArgumentParser) -> None:
 
 
 def run_repair(options: Namespace) -> int:
-    """Put right and print one registration after the other, as `explain` explains them.
-
-    Returns 0 if each is good or repaired, otherwise the largest status of `gpca.model.repaired.STATUSES`, or 2 if a row
-    of the CSV has a fault.
-    """
+    """Return 0 if each is good or repaired, else the largest of `gpca.model.repaired.STATUSES`, or 2."""
     return run_explain(options)

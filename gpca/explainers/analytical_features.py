@@ -1,7 +1,4 @@
-"""Analytical features of how well source and target agree.
-
-The paper only names "RMSE, normal consistency, planarity, linearity, and point-count ratios"; the formulas are ours.
-"""
+"""Analytical features of how well source and target agree; the paper names them, and the formulas are ours."""
 
 import numpy as np
 
@@ -12,11 +9,7 @@ from gpca.seeds import generator
 def analytical_features(
     registrations: Registrations, *axes: object, shape_points: int = 256, neighbors: int = 16, point_count: bool = True
 ) -> np.ndarray:
-    """Return (N, F): inlier RMSE (of diameters), the features of :func:`compare`, and perhaps the point-count ratio.
-
-    Local shape is measured at no more than `shape_points` source points, drawn by axes, split and sample, from
-    `neighbors` points each.
-    """
+    """Return (N, F): inlier RMSE (of diameters), the features of :func:`compare`, and perhaps the point-count ratio."""
     rows = []
     for i in range(len(registrations)):
         source, target = registrations.cloud(i), registrations.target(i)
@@ -28,10 +21,7 @@ def analytical_features(
 
 
 def compare(source_P_3: np.ndarray, target_Q_3: np.ndarray, drawn: np.ndarray, neighbors: int) -> list[float]:
-    """Compare the local shape of the aligned source at the drawn points with that of the nearest target points.
-
-    By mean |cosine| between the normals, mean planarity and linearity of the source, and their mean differences.
-    """
+    """Compare normals, planarity, linearity of the source at the drawn points with the nearest target points."""
     from scipy.spatial import cKDTree
 
     source_tree, target_tree = cKDTree(source_P_3), cKDTree(target_Q_3)
@@ -45,11 +35,7 @@ def compare(source_P_3: np.ndarray, target_Q_3: np.ndarray, drawn: np.ndarray, n
 
 
 def local_shape(tree, query_D_3: np.ndarray, neighbors: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return unsigned normals (D, 3), planarity (D,) and linearity (D,) of a cloud at the query points.
-
-    With the eigenvalues λ1 ≥ λ2 ≥ λ3 of the covariance of the nearest `neighbors` points, planarity is (λ2 - λ3)/λ1,
-    linearity (λ1 - λ2)/λ1 (Weinmann et al. 2015), and the normal the eigenvector of λ3; coincident points have zeros.
-    """
+    """Return normals (D, 3), planarity (λ2 - λ3)/λ1 and linearity (λ1 - λ2)/λ1 of neighbors (Weinmann et al. 2015)."""
     _, rows_D_K = tree.query(query_D_3, k=min(neighbors, tree.n))
     points_D_K_3 = tree.data[rows_D_K]
     offsets_D_K_3 = points_D_K_3 - points_D_K_3.mean(axis=1, keepdims=True)

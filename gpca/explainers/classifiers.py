@@ -57,10 +57,7 @@ def standardized_regression(inverse_regularisation: float):
 def boosted_trees(
     *axes: object, iterations: int = 150, learning_rate: float = 0.06, monotonic: Sequence[int] | None = None
 ):
-    """Return unfitted gradient boosting on histograms (Ke et al. 2017); the axes name its random numbers.
-
-    Where the features have signs, the probability rises or falls with those of a sign that is not 0.
-    """
+    """Return unfitted gradient boosting on histograms (Ke et al. 2017); the axes name its random numbers."""
     from sklearn.ensemble import HistGradientBoostingClassifier
 
     return HistGradientBoostingClassifier(
@@ -77,10 +74,7 @@ def boosted_trees(
 
 @dataclass(frozen=True)
 class BoostedQuestion:
-    """Boosted trees for a binary question, fitted by scikit-learn but evaluated without loading it.
-
-    Nodes of all trees are concatenated; a node's left child is the next node.
-    """
+    """Boosted trees for a binary question, evaluated without scikit-learn; a node's left child is the next node."""
 
     baseline: float  # log odds before any tree
     roots: np.ndarray  # (T,) root node of each tree

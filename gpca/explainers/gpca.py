@@ -33,10 +33,7 @@ class GPCA(DrawingExplainer):
 
 
 class DescriptorGPCA(GPCA):
-    """GP-CA on descriptors instead of the embedding, normalized by their ranks among the training samples.
-
-    `axes` name the random numbers of the normalization.
-    """
+    """GP-CA on descriptors, normalized by their ranks among the training samples; `axes` name the random numbers."""
 
     def __init__(self, axes: tuple, source: str, seed: int, **settings: GPCArguments) -> None:
         from gpca.explainers.pair_classifier import NormalizedFeatures

@@ -1,10 +1,4 @@
-"""The interface of explainers; :mod:`gpca.explainers.registry` finds them by name.
-
-An explainer is a class with ``fit`` and ``explain`` in a file of ``baselines/``, listed in that file's
-``EXPLAINERS`` by the name under which the config switches it on::
-
-    EXPLAINERS = {"my_explainer": ExplainerEntry("My explainer", MyExplainer, sees=("pair",))}
-"""
+"""The interface of explainers, which :mod:`gpca.explainers.registry` finds by name (docs/adding.md)."""
 
 from __future__ import annotations
 
@@ -155,10 +149,7 @@ class DrawingExplainer(ScoringExplainer):
 def measured(
     registrations: Registrations, prefix: str, measure: Callable[[], Mapping[str, np.ndarray]]
 ) -> Registrations:
-    """Attach measured arrays under prefixed names, unless some are attached already.
-
-    The prefix has to name everything that the numbers depend on.
-    """
+    """Attach arrays under a prefix that names all that they depend on, unless some are attached already."""
     if any(name.startswith(prefix) for name in registrations.attached):
         return registrations
     arrays = {prefix + name: array for name, array in measure().items()}

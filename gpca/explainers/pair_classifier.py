@@ -1,8 +1,4 @@
-"""GP-CA's classifiers on the descriptors of a pair: whether it failed, and which causes it has.
-
-Boosted trees can be averaged with the Gaussian processes: they err differently, so the mean of their probabilities is
-better than either. Variances and BALD are the processes'.
-"""
+"""GP-CA's classifiers on the descriptors of a pair, averaged with boosted trees; variances and BALD are GP-CA's."""
 
 from __future__ import annotations
 
@@ -29,10 +25,7 @@ ABSENT, PRESENT = "absent", "present"
 
 
 class NormalizedFeatures:
-    """Every descriptor mapped to a normal distribution by its ranks among the training samples.
-
-    Distances, angles, costs and counts have heavy tails, which would dominate a kernel with one lengthscale.
-    """
+    """Every descriptor, often with heavy tails, mapped to a normal distribution by its ranks in training."""
 
     def __init__(self, *axes: object) -> None:
         self._axes = axes
@@ -119,10 +112,7 @@ class PairClassifier:
         )
 
     def unlikeness(self, inputs_N_F: np.ndarray) -> np.ndarray:
-        """Return the mean distance (N,) to the nearest `NEIGHBORS` training samples.
-
-        The unit is the quantile `USUAL` of the same distance among the training samples, so 1 % of these exceed 1.
-        """
+        """Return the mean distance (N,) to the nearest training samples, in units of their quantile `USUAL`."""
         learned = self._failure.learned_N_d
         return _to_nearest(self._failure.project(inputs_N_F).inputs_N_d, learned, 0) / self.usual_distance
 

@@ -1,7 +1,4 @@
-"""Every explainer by name: GP-CA itself, the rivals in ``baselines/``, and those from outside.
-
-A file lists its explainers of concepts as ``EXPLAINERS`` and those of causes as ``CAUSE_EXPLAINERS``, separately named.
-"""
+"""Every explainer by name: GP-CA itself, the rivals in ``baselines/``, and those from outside."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -33,10 +30,7 @@ def explainer_entry(name: str, kind: str = CONCEPTS) -> ExplainerEntry:
 
 
 def require_settings(name: str, settings: Mapping[str, object], kind: str = CONCEPTS, reenacted: bool = False) -> None:
-    """Raise an InputError unless the explainer is known, takes these settings and has what it reads.
-
-    Of perturbed samples, those of the control ``hard`` alone are `reenacted`.
-    """
+    """Raise an InputError unless the explainer is known, takes these settings and has what it reads."""
     entry = explainer_entry(name, kind)
     require_arguments(f"explainer '{name}'", entry.make, 2, settings)
     if kind == CONCEPTS and entry.reads == REENACTED and not reenacted:

@@ -15,9 +15,8 @@ def accepted_below(
 ) -> float | None:
     """Return the largest score below which at most the share `risk` of the poses is wrong; None if there is none.
 
-    The share is that of the accepted poses, not of all. Its upper bound, one-sided at this confidence, is what stays
-    below the risk: families are drawn as wholes (linearized ratio of sums), and one more pose that is accepted and
-    wrong is counted, so that a few right poses are not enough. A score that is not finite is never accepted.
+    The upper bound of their share, one-sided at this confidence, stays below the risk: families are drawn as wholes
+    (linearized ratio of sums), and one more accepted and wrong pose is counted.
     """
     score_N, wrong_N = np.asarray(score_N, float), np.asarray(wrong_N, bool)
     rows = np.flatnonzero(np.isfinite(score_N))
@@ -38,11 +37,7 @@ def accepted_below(
 def accepted_in_hindsight(
     score_N: np.ndarray, wrong_N: np.ndarray, weights_B_N: np.ndarray, risk: float = WRONG
 ) -> np.ndarray:
-    """Return which poses (B, N) are accepted by the largest limit at which at most the share `risk` of them is wrong.
-
-    The limits are those of these very poses, for each of B weights, and promise nothing; infinite scores are never
-    accepted.
-    """
+    """Return which poses (B, N) are accepted by the largest limit that these very poses allow; it promises nothing."""
     order = np.argsort(score_N, kind="stable")
     weights_B_n, score_n = weights_B_N[:, order] * np.isfinite(score_N[order]), score_N[order]
     total_B_n, off_B_n = np.cumsum(weights_B_n, axis=1), np.cumsum(weights_B_n * wrong_N[order], axis=1)

@@ -103,10 +103,7 @@ class Scored:
 
 
 class Condition(NamedTuple):
-    """The rows (N,) that may be calibrated on, those that are tested, and the ways of calibration to compare.
-
-    The name is that of the calibration samples: ``families``, ``from_{source}``, ``milder``, ``harder`` or ``frames``.
-    """
+    """Rows (N,) that may be calibrated on and those that are tested; ways of calibration to compare."""
 
     name: str
     calibration: np.ndarray
@@ -127,10 +124,8 @@ class SetsAndCalls:
 def conditions(scored: Scored) -> list[Condition]:
     """The condition with a guarantee, and those without, as far as there are samples for them.
 
-    - from_{source}: calibrated on one source and tested on the others;
-    - milder, harder: calibrated on the half of the samples with less, or more, severity, and tested on the other half;
-      nominal and failed samples are halved separately;
-    - frames: calibrated on simulated registrations and tested on those of depth frames.
+    They are calibrated on one source and tested on the others (from_{source}); on the half of the nominal and of the
+    failed samples with less, or more, severity (milder, harder); on simulated registrations for depth frames (frames).
     """
     for_frames_N = np.char.startswith(scored.model, "frames")
     asked_N, real_N = ~scored.seen & ~for_frames_N, scored.source == REAL_WORLD
@@ -153,11 +148,7 @@ def conditions(scored: Scored) -> list[Condition]:
 
 
 def answers_of(scored: Scored, condition: Condition, settings: GuaranteeSettings) -> SetsAndCalls | None:
-    """Sets and calls for all tested rows, or None where there are none.
-
-    Every family is tested with thresholds that were calibrated on scores of the same model for other families, none of
-    which it was trained on.
-    """
+    """Sets and calls for all tested rows, or None; a family's thresholds are calibrated on others, by one model."""
     probabilities_N_5 = state_scores(scored.scores)
     family_N = np.unique(scored.family, return_inverse=True)[1]
     limits = {name: getattr(settings, name) for name in ("level", "missed", "false_alarms", "nonconformity")}
@@ -214,13 +205,7 @@ def plain_threshold(failure_M: np.ndarray, missed: float) -> float:
 
 
 def measures(asked: Scored, answers: SetsAndCalls, settings: GuaranteeSettings) -> Iterator[Measured]:
-    """Yield every measure of every variant.
-
-    - coverage: share of the sets that hold the true state, over all samples and over those of each state;
-    - set_size: mean number of states in a set; single_state: share of the sets of one state alone;
-    - missed_failures: share of the failed that are called good; false_alarms: of the nominal that are called failed;
-    - not_sure: share that is called neither.
-    """
+    """Yield every measure of every variant (results/README.md), over all samples or those of each state."""
     everything_A, nominal_A = np.ones(len(asked), bool), asked.state == NOMINAL
     true_A_5 = asked.state[:, None] == np.array(STATES)
     for variant, inside_A_5 in answers.sets.items():

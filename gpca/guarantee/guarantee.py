@@ -98,15 +98,8 @@ def calibrate(
 ) -> Guarantee:
     """Calibrate the guarantee for a new sample on samples that were not used for training.
 
-    With families, it holds for a sample of a new family, if families are exchangeable: K families allow a level of at
-    most K / (K + 1). Otherwise, it holds if single samples are exchangeable; those of a new family are only as far as
-    it resembles the others.
-
-    Args:
-        scores_N_K: scores of the states, as :func:`gpca.guarantee.guarantee.state_scores` returns them. The score of
-            failure is 1 minus that of the first state, nominal.
-        state_N: true states; ``borderline`` samples are left out.
-        missed, false_alarms, confidence: see :func:`gpca.evaluation.conformal.calibrate_alarm`.
+    With K exchangeable families, it holds for a new one at a level of at most K / (K + 1); without, for exchangeable
+    samples. Scores (N, K) are of the states, of which the first is nominal; ``borderline`` samples are left out.
     """
     state_N = np.asarray(state_N)
     if len(state_N) != len(scores_N_K) or (family_N is not None and len(family_N) != len(state_N)):
@@ -128,10 +121,7 @@ def whether_failed(scores_M_K: np.ndarray) -> np.ndarray:
 
 
 def states_of(truth: Truth) -> np.ndarray:
-    """Return the state (S,) of each registration: one of `STATES`, or ``borderline`` if it has no label.
-
-    A failure with at most one cause above the limit has the state of its dominant cause.
-    """
+    """Return the state (S,) of registrations; a failure with at most one cause has its dominant cause."""
     label_S = labels_of(truth)
     failed_S = (label_S != NOMINAL) & (label_S != BORDERLINE)
     return np.where(failed_S & (truth.causes.sum(axis=1) > 1), SEVERAL, label_S)
@@ -140,9 +130,7 @@ def states_of(truth: Truth) -> np.ndarray:
 def state_scores(scores_N_4: np.ndarray) -> np.ndarray:
     """Return scores (N, 5) of `STATES` that sum to 1, from the scores of nominal and of the three causes.
 
-    The scores of the causes are normalized to shares s. A failure has the single cause c with the probability s_c² that
-    two draws from the shares both give c, and several causes with 1 - Σ s_c². Sets are valid with any such rule; a
-    better one would make them smaller.
+    Causes are normalized to shares s: a failure has the single cause c with probability s_c², several with 1 - Σ s_c².
     """
     conformal.require_scores(scores_N_4, LABELS)
     nominal_N = np.clip(scores_N_4[:, 0], 0, 1)

@@ -1,7 +1,4 @@
-"""Files of nested mappings and lists with arrays: a zip of one JSON text and of NumPy's arrays, as a model is kept.
-
-A file may come from anywhere: reading it executes no code, and it holds only plausible numbers.
-"""
+"""Files of nested mappings and lists with arrays, as a zip of JSON and arrays; reading one executes no code."""
 
 import json
 import zipfile

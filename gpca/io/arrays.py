@@ -22,10 +22,7 @@ _HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.r
 
 
 def save_arrays(path: str | Path, arrays: Mapping[str, np.ndarray], axes: Axes | None = None) -> None:
-    """Write an npz whose bytes depend on the arrays and axes alone (NumPy stamps every member 1980-01-01).
-
-    The axes are kept beside the arrays as ``source`` and ``seed``.
-    """
+    """Write an npz of the arrays, ``source`` and ``seed``; equal ones give equal bytes."""
     with whole_file(path) as partial:
         write_arrays(partial, arrays, axes)
 
@@ -47,17 +44,9 @@ def load_arrays(
 ) -> dict[str, np.ndarray]:
     """Load the arrays of an npz that a stage needs, and no others.
 
-    What their headers say is checked before any data is read, so that a small file cannot fill the memory. InputError
-    for a damaged file, another source or seed, and values that are wrong in any array: NaN, numbers that no sensor
-    measures, names of several lines, an unknown split.
-
-    Args:
-        shapes: for each needed array its shape; a number must match, a name (``"S"``) must be the same size wherever
-            it occurs, and ``"S+1"`` one more.
-        kinds: for some of them what they may hold: `TEXT`, `WHOLE` or `REAL`. Any other may hold each of these.
-        axes: the source and seed that the file has to be of; it may be of any where this is None.
-        optional: arrays that may be missing, as ``source`` in a file that a user's own program wrote.
-        remedy: what to do about a damaged file.
+    Headers are checked before any data is read, so that a small file cannot fill the memory. In `shapes`, a name as
+    ``"S"`` is the same size wherever it occurs, and ``"S+1"`` one more; `kinds` say what some hold, `axes` the source
+    and seed that the file has to be of. InputError for a damaged file, and values that are wrong in any array.
     """
     path = Path(path)
     require_file(path, "no such file", "make it with Snakemake", math.inf)
@@ -95,10 +84,7 @@ def load_arrays(
 def require_numbers(
     values: object, shape: tuple[int | None, ...], name: str, kinds: str = f"b{REAL}", finite: bool = True
 ) -> np.ndarray:
-    """Return an array that code from outside made; InputError unless it is one, of this shape, and of plain numbers.
-
-    None stands for any size.
-    """
+    """Return an array of plain numbers from outside code, or raise an InputError; None stands for any size."""
     wanted = "×".join("N" if size is None else str(size) for size in shape)
     fault = ""
     if not isinstance(values, np.ndarray) or isinstance(values, np.matrix | np.ma.MaskedArray):

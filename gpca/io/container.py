@@ -24,11 +24,7 @@ REGENERATE_BOTH = "regenerate both from the same config"
 
 @dataclass(frozen=True)
 class ArrayField:
-    """What one array of a container may hold.
-
-    The first axis of an array with `offsets` has all rows' parts one after another: those of row i are
-    ``array[offsets[i]:offsets[i + 1]]``.
-    """
+    """What an array holds; with `offsets`, row i has the part ``array[offsets[i]:offsets[i + 1]]``."""
 
     shape: tuple[int | str, ...]  # sizes, and names of dimensions, which have one size in a file; `S+1` is one more
     kind: str = REAL  # TEXT, WHOLE, REAL, FLOAT or FLAG
@@ -47,10 +43,7 @@ def array(shape: str, kind: str = REAL, **limits: Any) -> Any:
 
 @dataclass(frozen=True)
 class Container:
-    """Arrays of samples, and the file that holds them. The first dimension of the first array counts the samples.
-
-    `axes` are the source and the seed of the samples; None where they are from several, or were not asked for.
-    """
+    """Arrays of samples, counted by the first dimension of the first, and the file that holds them."""
 
     axes: Axes | None = field(default=None, kw_only=True)
     remedy: ClassVar[str] = REGENERATE  # what to do about a damaged file

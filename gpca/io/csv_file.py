@@ -27,10 +27,7 @@ ANY = ("*",)
 def read_csv(
     path: str | Path, columns: Iterable[str], others: Iterable[str] = (), remedy: str = "regenerate it"
 ) -> pd.DataFrame:
-    """Read a CSV file with at least one row, all entries as text; InputError for a damaged one.
-
-    `columns` are required, `others` are patterns of optional ones: `ANY` for files of users, or if only a part is read.
-    """
+    """Read a CSV file as text, with the required columns and patterns of others; InputError for a damaged one."""
     require_file(path, "no such file", "make it with snakemake")
     import pandas as pd
 

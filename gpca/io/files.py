@@ -1,8 +1,4 @@
-"""Files: readable within limits, written whole or not at all, named, and images.
-
-A small file may claim to be large, or unpack to a large one, so sizes are checked before anything is read. Files of
-another source or seed often have the same shapes, so the step that makes a file writes them, and readers check them.
-"""
+"""Files: readable within limits, written whole or not at all, named, and images."""
 
 from __future__ import annotations
 
@@ -46,11 +42,7 @@ _BREAKS = ("Cc", "Zl", "Zp", "Cs")
 
 
 def require_file(path: str | Path, fault: str, remedy: str, largest_bytes: float = LARGEST_FILE_BYTES) -> None:
-    """Raise an InputError unless a user's file can be read to its end; all readers of users' files call this.
-
-    Reading a device, a pipe, or an empty file of the kernel, as in /proc, may never end. `fault` is the message for a
-    missing file, `largest_bytes` what its reader can parse.
-    """
+    """Raise an InputError unless a user's file can be read to its end, which devices and pipes may not have."""
     try:
         status = os.stat(path)
         if stat.S_ISREG(status.st_mode) and status.st_size:
@@ -109,11 +101,7 @@ def require_axes(path: str | Path, actual: Axes, expected: Axes | None) -> None:
 
 @contextmanager
 def whole_file(path: str | Path) -> Iterator[Path]:
-    """Yield a temporary path beside `path`, with its suffix, renamed to `path` on success and removed on failure.
-
-    A killed run leaves the old file, and a partial one with a fixed name that the next writer replaces. Writers of one
-    file wait for one another, so the block may read the old file to add to it.
-    """
+    """Yield a temporary path beside `path`, locked, renamed to it on success and removed on failure."""
     path = Path(path)
     with full_disk_named(path), _alone(path.with_name(f".{path.stem}.partial{path.suffix}")) as partial:
         yield partial
@@ -209,10 +197,7 @@ def append_row(path: Path, row: Sequence[object], head: Sequence[object]) -> Non
 
 
 def require_apart(options: Namespace, outputs: Iterable[str], also_read: Iterable[str | Path] = ()) -> None:
-    """Check before the work that a command can write its outputs, named as options, and reads none of them.
-
-    All that its other options name is read, and `also_read`, such as a default.
-    """
+    """Check before the work that a command can write its outputs, named as options, and reads none of them."""
     given = vars(options) | dict.fromkeys(outputs)
     values = [each for value in given.values() for each in (value if isinstance(value, list) else [value])]
     read = [each for each in values if isinstance(each, Path) or (isinstance(each, str) and os.path.isfile(each))]
@@ -220,10 +205,7 @@ def require_apart(options: Namespace, outputs: Iterable[str], also_read: Iterabl
 
 
 def require_outputs(outputs: Iterable[str | Path], inputs: Iterable[str | Path] = (), folders: bool = False) -> None:
-    """Check before the work that outputs can be written, and that none of them is an input; folders may be missing.
-
-    Of a folder that is read, only pages are replaced.
-    """
+    """Check before the work that outputs can be written and are no inputs; of a folder, only pages are replaced."""
     taken = {_real(path) for path in inputs}
     read = [path for path in taken if path.is_dir()]
     for output in map(Path, outputs):

@@ -40,11 +40,7 @@ def load_own_yaml(path: Path) -> Any:
 
 
 def read_mapping(path: str | Path) -> dict[str, Any]:
-    """Return the mapping that a YAML or JSON file holds.
-
-    InputError for a repeated key, a scalar that only YAML 1.1 has (`_ALIKE`), aliases that expand to more than
-    `MOST_ENTRIES` or contain themselves, and what :func:`require_plain` refuses.
-    """
+    """Return the mapping in a YAML or JSON file; InputError for repeated keys, ambiguous scalars, endless aliases."""
     path = Path(path)
     require_file(path, "no such file", "name a config, a YAML or JSON file", LARGEST_CONFIG_BYTES)
     try:

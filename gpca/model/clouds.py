@@ -1,8 +1,4 @@
-"""The clouds of a user's registration: read, checked, brought into the target's frame, compared with training clouds.
-
-Three measures of geometry, which do not depend on the pose, compare a pair with the training data. A pair may also be
-void: then its scores mean nothing, and the user should check the input.
-"""
+"""The clouds of a user's registration: read, checked, brought into the target's frame, compared with training."""
 
 from __future__ import annotations
 
@@ -65,11 +61,7 @@ def require_format(path: Path) -> None:
 
 
 def read_points(path: Path) -> np.ndarray:
-    """Read a cloud of any size, or sample a mesh: points (N, 3) in the file's unit, with rows without a measurement.
-
-    Raises InputError for a file that is missing, unreadable or of another format, too few points,
-    or a mesh with NaN or without area.
-    """
+    """Read a cloud of any size, or sample a mesh: points (N, 3) in the file's unit, with rows without a measurement."""
     return _read(path)[0]
 
 
@@ -188,12 +180,7 @@ def _thinned(points: np.ndarray, cloud_points: int, role: str, notes: list[str])
 
 
 def measure(source: np.ndarray, target: np.ndarray) -> dict[str, float]:
-    """Return `MEASURES` of a pair of clouds (N, 3) and (M, 3), both in diameters of the target.
-
-    - size: ratio of the radii of gyration, source to target;
-    - closure: :func:`hidden_share` of the target: 0.3 to 0.5 for a whole object, 0 to 0.2 for a view from one side;
-    - depth: ratio of the hidden shares, source to target; NaN for thin targets.
-    """
+    """Return `MEASURES` in diameters: ratios of radii of gyration and of hidden shares, NaN if thin; closure."""
     closure = hidden_share(target)
     depth = hidden_share(source) / closure if closure >= FLAT else np.nan
     return {"size": relative_size(source, target), "depth": float(depth), "closure": closure}

@@ -1,8 +1,4 @@
-"""The trained part of a model that diagnoses a registration, and its training on measured causes.
-
-Thresholds and guarantees are calibrated on unseen families of shapes: each fold of the families is judged by what was
-trained on the others. The final classifiers are trained on all.
-"""
+"""The trained part of a model that diagnoses a registration; thresholds are calibrated on unseen families of shapes."""
 
 from __future__ import annotations
 
@@ -105,15 +101,7 @@ class Diagnoser:
         register: bool = True,
         tolerance: float = DEFAULT_TOLERANCE,
     ) -> tuple[Diagnosis, list[Enactment]]:
-        """Diagnose a registration, and return its re-enactments; the same clouds give the same numbers.
-
-        Args:
-            observed: (N, 3) at the initial pose, in diameters and in the model's frame.
-            model: (M, 3).
-            T_icp: (4, 4) result of ICP, maps the observed cloud to the model.
-            register: whether ICP may end its descent on the drawn points; otherwise the pose is taken as it is.
-            tolerance: largest error of a right result, in diameters.
-        """
+        """Diagnose the pose of a cloud (N, 3), at its initial one, on a model (M, 3), and return re-enactments."""
         features_F, evidence, reenacted, enactments = self.measured(observed, model, T_icp, register)
         described_1_F = features_F[None, -DESCRIPTORS:] if register else None
         inputs_1_F = self.classifier.normalized(features_F[None])
@@ -282,12 +270,7 @@ def learn(
     false_alarms: float,
     *axes: object,
 ) -> tuple[Diagnoser, np.ndarray, dict[float, np.ndarray]]:
-    """Return the trained diagnoser, and of unseen families the BALD (nats) of failures, and the probabilities (N,) of
-    results to be off by more than each of `TOLERANCES`.
-
-    At most the share `false_alarms` of registrations of unseen families that are right reaches a threshold: of those
-    with a nominal mean error that of the start, and of those within a tolerance that of the result.
-    """
+    """Return the diagnoser, and of unseen families the BALD of failures and the probabilities of results to be off."""
     judged, result_T_N = judged_unseen(training, gpc, *axes)
     clear_N, nominal_N = training.label_N != BORDERLINE, training.label_N == NOMINAL
     start_threshold = threshold_of(judged.failure_N[nominal_N], false_alarms)
@@ -312,10 +295,7 @@ def learn(
 
 
 def judged_unseen(training: TrainingSet, gpc: GPCSettings, *axes: object) -> tuple[Judgment, np.ndarray]:
-    """Judge every registration by what was trained on other families: its start and causes, and its result.
-
-    The probabilities of the results (T, N) are at `TOLERANCES`. Classifiers do not learn from borderline registrations.
-    """
+    """Judge registrations by classifiers of other families: start and causes, and results (T, N) at `TOLERANCES`."""
     count = len(training.label_N)
     shapes = {"failure_N": (), "causes_N_3": (3,), "causes_variances_N_3": (3,), "bald_N": ()}
     parts = {name: np.full((count, *shape), np.nan) for name, shape in shapes.items()}
@@ -335,11 +315,7 @@ def judged_unseen(training: TrainingSet, gpc: GPCSettings, *axes: object) -> tup
 def calibrated(
     training: TrainingSet, judged: Judgment, result_N: np.ndarray, tolerance: float, false_alarms: float
 ) -> Calibrated:
-    """Calibrate threshold, alarm and sets of results at a tolerance, by judgments of unseen families.
-
-    Sets of states hold for new families if there are enough families. The alarm's level is too high for their number:
-    it is calibrated on single samples, and holds as far as registrations of a new family are like the others.
-    """
+    """Calibrate threshold, alarm and sets of results at a tolerance, by judgments of unseen families."""
     state_N = training.states_within(tolerance)
     scores_N_5 = state_probabilities(judged.causes_N_3, result_N)
     family_N = training.family_N if highest_level(training.family_N) >= LEVEL else None
@@ -369,10 +345,7 @@ def measured(training: TrainingSet, judged: Judgment, threshold: float) -> dict[
 
 
 def alarms(failed_N: np.ndarray, probability_N: np.ndarray, threshold: float, family_N: np.ndarray) -> dict[str, float]:
-    """Return how well a probability tells failures, and what an alarm from a threshold on gets wrong.
-
-    Each measure that has a value has the ends of its 95 % interval over families beside it.
-    """
+    """Return how well a probability tells failures, and what an alarm gets wrong, with 95 % intervals over families."""
     from gpca.causes.judged import ranking
 
     weights_B_N = np.vstack([np.ones(len(family_N)), pigeonhole_weights(generator("held out"), family_N)])

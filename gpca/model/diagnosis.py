@@ -105,14 +105,7 @@ class Guaranteed:
 
 
 def state_probabilities(causes_N_3: np.ndarray, result_N: np.ndarray) -> np.ndarray:
-    """Return probabilities (N, 5) of :data:`gpca.guarantee.guarantee.STATES` that sum to 1, by those of each cause.
-
-    `result_N` are the probabilities of failed results.
-
-    Causes are assumed to be independent, given a failure. The probability that a failure has no cause is distributed
-    over the causes in proportion to their probabilities, since a failure without a cause above the limit is labeled by
-    its dominant cause.
-    """
+    """Return probabilities (N, 5) of `STATES`, from those of failed results (N,) and independent causes (N, 3)."""
     causes_N_3 = np.clip(causes_N_3, SMALLEST, 1)
     rest_N_3 = 1 - causes_N_3
     others_N_3 = np.stack([np.delete(rest_N_3, c, axis=1).prod(axis=1) for c in range(rest_N_3.shape[1])], axis=1)
@@ -183,10 +176,7 @@ def in_unit_of(frame: CanonicalFrame, values: Any, *names: str) -> dict[str, Any
 
 @dataclass(frozen=True)
 class Reenacted:
-    """Counterfactuals of one registration under the hypotheses of its true pose.
-
-    Lengths are in diameters, and poses in the target's canonical frame, until :meth:`outside` converts them.
-    """
+    """Counterfactuals under hypotheses of the true pose, in diameters and the canonical frame until `outside`."""
 
     error: float  # v̂ with all causes, the mean over the hypotheses
     effects: dict[str, float]  # φ̂, the contribution of each cause to that error
@@ -219,10 +209,7 @@ class Reenacted:
         )
 
     def with_fit(self, observed: np.ndarray, T_result: np.ndarray, surface: ModelSurface, open_ends: bool) -> Reenacted:
-        """Add what a cloud (N, 3) at its initial pose leaves undetermined, and its scale.
-
-        With `open_ends`, the surface may go on where it was not seen.
-        """
+        """Add what a cloud (N, 3) leaves undetermined, and its scale; with `open_ends`, the surface may go on."""
         first = self.poses[0]
         T_k = [first.T_target_source] if first.registered else [first.T_target_source, T_result]
         placed = transform(T_k[0], observed)

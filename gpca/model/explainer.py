@@ -1,7 +1,4 @@
-"""Explains a user's registration with a trained model and the settings of its training samples.
-
-ICP is the compiled loop, not Open3D's as for those samples (docs/protocol.md#two-loops-of-icp).
-"""
+"""Explains a user's registration with a trained model, by the compiled ICP (docs/protocol.md#two-loops-of-icp)."""
 
 from __future__ import annotations
 
@@ -48,13 +45,7 @@ INVERSE_COST = 0.5  # an inverse initial pose that ends with a smaller share of 
 
 
 class Explainer:
-    """Explains registrations with a trained model.
-
-    Args:
-        model: by default, the one found by :func:`gpca.model.location.model_path`.
-        policy: turns scores into an action; by default, the model's own.
-        device: device of torch for the encoder; by default, the CPU without torch.
-    """
+    """Explains registrations with a model and its policy, by default those found; without a `device`, without torch."""
 
     def __init__(
         self, model: Model | None = None, policy: RecoveryPolicy | None = None, device: str | None = None
@@ -88,28 +79,15 @@ class Explainer:
         """Register the source to the target and explain the result. The same clouds give the same numbers.
 
         Args:
-            source_points, target_points: (N, 3) observed cloud and reference to which it is aligned: arrays or Open3D
-                clouds.
-            T_target_source_init: (4, 4) initial pose; by default, the identity.
-            unit: unit of points, pose and results: ``m``, ``cm`` or ``mm``.
+            source_points, target_points: (N, 3) arrays or Open3D clouds, in the `unit` of poses and results, too.
             frame: canonical frame of the target; by default, computed from its points.
             uncertainty: spread of the starts for the uncertainty of the pose; None skips it.
-            diagnose: whether to diagnose the registration. GP-CA alone takes a fifth of the time,
-                cannot state that nothing is wrong, and then determines the action.
-            method: registration method (docs/registration.md) with its default settings; by default, the model's own
-                ICP, on whose results the classifier was trained.
-            estimator: uncertainty estimator (docs/registration.md) that needs no training registrations. A note states
-                why it failed.
+            diagnose: whether to diagnose the registration; else GP-CA alone determines the action.
+            method, estimator: of docs/registration.md; by default, the model's own ICP, and Monte-Carlo.
             tolerance: how far the pose may be off: a length, an angle or a share of the diameter, such as ``5mm``.
             register: whether to register; otherwise the initial pose itself is explained, as :meth:`judge` does.
-            source_unit: unit of the source's points, if another one; they are converted first.
-            fast: whether to re-enact fewer points and poses, without a guarantee; it saves a tenth to a fifth of the
-                time.
+            fast: whether to re-enact fewer points and poses, without a guarantee.
             repair: whether to put a wrong result right, see :meth:`repair`.
-
-        Raises:
-            InputError: too few points with a measurement, implausible units, very different sizes, an initial pose that
-                is not rigid, unknown method or estimator, missing package, or an estimator that has to be trained.
         """
         began, seconds, notes = perf_counter(), dict[str, float](), list[str]()
         inputs = (source_points, target_points, T_target_source_init, unit, frame)
@@ -206,11 +184,7 @@ class Explainer:
         tolerance: Tolerance | str = DEFAULT_TOLERANCE,
         source_unit: str | None = None,
     ) -> Repair:
-        """Register the source to the target and, if the result is wrong, put it right (docs/repair.md).
-
-        The arguments are those of :meth:`explain`. Without `register`, the given pose is put right. The method also
-        refines what the search finds, unless it is global.
-        """
+        """Register and, if the result is wrong, put it right (docs/repair.md); arguments as of :meth:`explain`."""
         started = perf_counter()
         notes: list[str] = []
         inputs = (source_points, target_points, T_target_source_init, unit, frame)
@@ -227,13 +201,7 @@ class Explainer:
     def calibrated(
         self, explanations: Sequence[Explanation], labels: Sequence[str], groups: Sequence[str] | None = None
     ) -> Explainer:
-        """Return an explainer whose alarm, sets and threshold are set on registrations that you have labeled.
-
-        Args:
-            explanations: by this explainer, all with the tolerance that the labels are for.
-            labels: ``right`` or ``wrong``, or in place of ``wrong`` its cause: noise, pose, overlap or several.
-            groups: names of families or scenes, if the promise is to hold for new ones.
-        """
+        """Return an explainer whose limits are set on explanations of labeled registrations (docs/guarantee.md)."""
         from gpca.model.calibration import LabeledRegistrations
 
         labeled = LabeledRegistrations.of([explanation.diagnosis for explanation in explanations], labels, groups)
@@ -243,26 +211,9 @@ class Explainer:
     def explain_many(
         self,
         pairs: Iterable[tuple[np.ndarray, np.ndarray] | tuple[np.ndarray, np.ndarray, np.ndarray | None]],
-        unit: str = "m",
-        uncertainty: UncertaintySettings | None = None,
-        diagnose: bool = True,
-        method: str | None = None,
-        estimator: str = MONTE_CARLO,
-        fast: bool = False,
-        source_unit: str | None = None,
+        **options: Any,
     ) -> Iterator[Explanation]:
-        """Yield the explanation of each pair, as :meth:`explain` returns it but without the data of a page.
-
-        The frame of a target is computed once for consecutive pairs that share the same array.
-
-        Args:
-            pairs: source, target, and optionally the initial pose.
-            unit, uncertainty, diagnose, method, estimator, fast, source_unit: see :meth:`explain`.
-
-        Raises:
-            InputError: see :meth:`explain`; the message names the number of the pair, from 0.
-        """
-        options = uncertainty, diagnose, method, estimator, fast
+        """Yield the explanation of each pair of source, target and perhaps initial pose, without the data of a page."""
         last_target, frame = None, None
         for number, (source_points, target_points, *init) in enumerate(pairs):
             try:
@@ -270,18 +221,12 @@ class Explainer:
                     last_target = target_points
                     frame = CanonicalFrame.of(as_points(target_points, "target"), None)
                 T_init = init[0] if init else None
-                explanation = self.explain(
-                    source_points, target_points, T_init, unit, frame, *options, source_unit=source_unit
-                )
-                yield replace(explanation, scene=None)
+                yield replace(self.explain(source_points, target_points, T_init, frame=frame, **options), scene=None)
             except InputError as fault:
                 raise InputError(f"pair {number}", str(fault)) from fault
 
     def embed(self, aligned: np.ndarray) -> np.ndarray:
-        """Return the embedding (1, d) of an aligned source cloud (N, 3) in the canonical frame.
-
-        It is the mean over as many random draws as in training, or one if the cloud has the encoder's number of points.
-        """
+        """Return the mean embedding (1, d) of random draws of an aligned source cloud (N, 3) in the canonical frame."""
         settings = self.model.encoder.settings
         n = settings.draw_points
         draws = 1 if len(aligned) == n else settings.draws
@@ -316,10 +261,7 @@ class Explainer:
         notes: list[str],
         seconds: dict[str, float],
     ) -> tuple[Clouds, float, Outcome]:
-        """Return the prepared clouds, how far the pose may be off, in the unit of the points, and the registration.
-
-        The inputs are both clouds, the initial pose, unit and frame.
-        """
+        """Return the prepared clouds, how far the pose may be off, in the unit of the points, and the registration."""
         with _timed(seconds, "preparation"):
             clouds = Clouds.prepared(*inputs, self.model.cloud_points, self.model.icp, notes, source_unit)
             allowed = tolerance if isinstance(tolerance, Tolerance) else Tolerance.parse(tolerance)

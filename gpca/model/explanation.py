@@ -166,16 +166,7 @@ class ExplainedRegistration:
 
 @dataclass(frozen=True, kw_only=True)
 class Explanation(ExplainedRegistration):
-    """One registration of an object, explained by a trained model.
-
-    Attributes:
-        fitness, inlier_rmse: share of source points with a correspondence; their RMSE, in the unit of the points.
-        scores, variances: GP-CA as in the paper, which sees only the aligned source and always names a concept: mean
-            and variance over the posterior draws (Eqs. 4, 5).
-        bald, entropy: uncertainty of these in nats: Eq. 7, and the entropy of the scores.
-        warnings: how the pair differs from the training data.
-        scene: data of the 3-D view for :meth:`html`; None for explanations made in bulk.
-    """
+    """One registration of an object, explained by a trained model."""
 
     diagnosis: Diagnosis | None  # state and causes, learned from measured causes; None if not requested
     repaired: ExplainedRegistration | None = None  # a :class:`gpca.model.repaired.Repair`, if requested
@@ -269,12 +260,7 @@ class Evidence:
 
 @dataclass(frozen=True, kw_only=True)
 class ScanExplanation(ExplainedRegistration):
-    """One registration of two partial scans of a scene, explained without a model.
-
-    Attributes:
-        fitness, inlier_rmse: share of the source's voxels with a partner within two voxels; their RMSE.
-        overlap: share of the source that lies on the target, and of the target that lies on the source.
-    """
+    """One registration of two partial scans of a scene, explained without a model."""
 
     voxel: float  # edge length of the voxels
     state: str  # ``nominal``, ``failed`` or ``not sure``

@@ -23,10 +23,7 @@ ROWS = [subset for subset in BY_SIZE if len(SUBSETS[subset]) in (0, 2, 3)]  # al
 
 
 def draw_explanation(explanation: Explanation, png_path: str | Path, names: str = "") -> None:
-    """Write one explanation as a PNG of 200 dpi; `names` of the files are its title.
-
-    Raises ValueError for an explanation without a scene.
-    """
+    """Write one explanation as a PNG of 200 dpi, with a title; ValueError for one without a scene."""
     if (scene := explanation.scene) is None:
         raise ValueError("an explanation that came as one of many has no clouds to draw")
     views = _views(explanation, scene)

@@ -1,7 +1,4 @@
-"""The model file, which contains arrays, numbers and names only, so that loading it executes no code.
-
-A model may come from anywhere, so its contents are checked when it is loaded.
-"""
+"""The model file: arrays, numbers and names only, checked when loaded, so that loading executes no code."""
 
 from __future__ import annotations
 

@@ -17,11 +17,7 @@ def require_model(path: str | Path) -> None:
 
 
 def model_path(chosen: str | Path | None = None, results: Path = RESULTS) -> Path:
-    """Return the path to use: the given one, that of the environment, a model of the workflow, or `SHIPPED`.
-
-    Among the runs in `results`, ``full`` comes first, then ``default``, then the newest other run. ``smoke``, which is
-    too small to trust, is the last resort, after `SHIPPED`.
-    """
+    """Return the given path, that of the environment, the best run's in `results`, `SHIPPED`, or that of ``smoke``."""
     if chosen is not None:
         return Path(chosen)
     if named := os.environ.get(VARIABLE):

@@ -1,7 +1,4 @@
-"""The HTML page of an explanation: one file that needs no other and no network; text from users is escaped.
-
-Everywhere, `explained` is :meth:`gpca.model.explanation.Explanation.as_dict`.
-"""
+"""The HTML page of an explanation, from its `as_dict`: one file, without a network; text from users is escaped."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -145,10 +142,7 @@ def poses(reenacted: Reenacted, subject: str, unit: str, *, observation: bool = 
 def counterfactuals(
     scene: Scene, unit: str, without: Mapping[str, str] = WITHOUT, bars: str = "mean errors over starts around it"
 ) -> str:
-    """Draw the eight re-enacted registrations under each hypothesis, each as a button that shows its cloud.
-
-    `without` says what removing each cause means, `bars` which errors are drawn.
-    """
+    """Draw the eight re-enacted registrations under each hypothesis, each as a button that shows its cloud."""
     if not scene.possibilities:
         return ""
     errors = [[scene.frame.diameter * error for error in pose.errors] for pose in scene.possibilities]

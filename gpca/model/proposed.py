@@ -30,10 +30,7 @@ Errors = Callable[[int, np.ndarray], np.ndarray]  # row, poses T_target_source (
 
 @dataclass(frozen=True)
 class Proposed(Container):
-    """The proposals for N registrations, P each: the registered pose, then others under K poses that may be true.
-
-    Where a pair has fewer, its first proposal stands in the place of the others, with weight 0.
-    """
+    """The proposals for N registrations, P each: the registered pose, then others, the first again with weight 0."""
 
     error_N_P: np.ndarray = array("N P", least=0)  # diameters, capped as those of causes
     weight_N_P: np.ndarray = array("N P", least=0, most=1)
@@ -126,12 +123,7 @@ def joined(proposals: Sequence[Proposals], errors: Sequence[np.ndarray], family_
 def with_repair(
     levels: Sequence[Calibrated], proposed: Proposed, result_N_of: Mapping[float, np.ndarray] | None = None
 ) -> tuple[Calibrated, ...]:
-    """Return the levels with the probability below which a pose is called repaired.
-
-    The samples are registrations that are called failed, by judges that learned from other families, and the proposal
-    for each that is most probably right; of those called repaired, few are off (`accepted_below`). Registered poses
-    are judged by the results (N,) at each tolerance, if there are any.
-    """
+    """Return levels with the probability below which few of the called repaired are off, for unseen families."""
     probability_L_N_P = np.zeros((len(levels), *proposed.error_N_P.shape))
     for seen, unseen in proposed.folds():
         judge, asked = proposed.subset(seen).judge(), proposed.subset(unseen)

@@ -1,8 +1,4 @@
-"""Repair of a registration: a pose that was found wrong gives way to a hypothesis of the true one, if that is right.
-
-All poses take what was observed, where it lay before the registration, to the model; lengths are in diameters. What is
-proposed does not depend on a judge, so that one file of proposals serves judges that learned from any families.
-"""
+"""Repair: a wrong pose gives way to a hypothesis of the true one, if that is right; lengths are in diameters."""
 
 from __future__ import annotations
 
@@ -80,13 +76,7 @@ def propose(
     refine: Refine,
     measure: Measure,
 ) -> Proposals:
-    """Refine hypotheses (K, 4, 4) of the true pose of observed points (N, 3).
-
-    Args:
-        weight_K: their probabilities, 0 for entries that only fill up.
-        refine: what refines them.
-        measure: fitness and inlier RMSE of poses, as the judge knows them.
-    """
+    """Refine hypotheses (K, 4, 4) of the true pose of points (N, 3); a weight of 0 marks those that only fill up."""
     possible = np.flatnonzero(weight_K > 0)
     possible = possible[np.argsort(-weight_K[possible], kind="stable")]
     T_k = refine(observed, T_K[possible])
@@ -103,11 +93,7 @@ def propose(
 
 @dataclass(frozen=True)
 class TruePoses:
-    """Poses that may be true.
-
-    A pose that was refined from a hypothesis agrees with it, right or wrong. One more estimate of the true pose, by
-    another criterion, therefore stands beside the hypotheses.
-    """
+    """Hypotheses that may be true, and an estimate by another criterion, as refined poses agree with theirs."""
 
     whole: (
         ModelSurface  # by which errors are measured: as what was observed under the likeliest hypothesis completes it
@@ -146,10 +132,7 @@ def unrefined(observed: np.ndarray, T_k: np.ndarray) -> np.ndarray:
 
 
 def by_mixture(model: np.ndarray, spacing: float) -> Refine:
-    """Return what refines poses to a model (M, 3) by the likelihood of the hypotheses, in which outliers hardly count.
-
-    The spacing is the distance between the model's points.
-    """
+    """Return what refines poses to a model (M, 3) by the likelihood of the hypotheses; outliers hardly count."""
     mixture = Mixture(model, spacing / 2)
 
     def refine(observed: np.ndarray, T_k: np.ndarray) -> np.ndarray:
@@ -161,10 +144,7 @@ def by_mixture(model: np.ndarray, spacing: float) -> Refine:
 
 
 def by_method(model: np.ndarray, surface: ModelSurface, name: str, seed: int) -> Refine:
-    """Return what refines poses to a model (M, 3) by a registration method, on the points that are no outliers there.
-
-    Where the method fails, the pose stays. `surface` is that of some of the model's points.
-    """
+    """Return what refines poses to a model (M, 3) by a method, without outliers; where it fails, they stay."""
     method = make_method(name)
 
     def refine(observed: np.ndarray, T_k: np.ndarray) -> np.ndarray:
@@ -199,9 +179,7 @@ def decide(
 ) -> Verdict:
     """Return the verdict: a pose that is not called failed stays, another takes its place only if it is called good.
 
-    If none is called good, the fewest most probable poses of which one is right are given, if they are called good so.
-    A lost registration, which ended away from the target, never stays. Descriptors are those of the registration, if
-    there was one.
+    Else, the fewest most probable poses of which one is right are given; a lost one, away from the target, never stays.
     """
 
     def of_set(rows: list[int]) -> float:
@@ -222,14 +200,7 @@ def verdict_of(
     good_below: float,
     of_set: Callable[[list[int]], float],
 ) -> Verdict:
-    """Return the verdict on a registered pose, the first, and others, by how probably each is off.
-
-    Args:
-        weight_n: probabilities of the hypotheses at the poses.
-        failed_from, good_below: probabilities from which the registered pose is called failed, and below which another
-            is called good.
-        of_set: probability that all poses of some rows are off.
-    """
+    """Judge the first pose and others, of these weights, by how probably each, or all of some rows, is off."""
     if probability_n[0] < failed_from:
         return Verdict(GOOD, 0, (), probability_n)
     best = 1 + int(probability_n[1:].argmin()) if len(probability_n) > 1 else 0
@@ -270,10 +241,7 @@ def difference(surface: ModelSurface, T_one: np.ndarray, T_other: np.ndarray) ->
 
 
 def unseen(points: np.ndarray, surface: ModelSurface, T: np.ndarray) -> tuple[float, Part | None]:
-    """Return the share of outliers among observed points (N, 3) at a pose, and the part of the surface they leave out.
-
-    It is None where they leave out next to nothing.
-    """
+    """Return the share of outliers among points (N, 3) at a pose, and the part of the surface they leave out."""
     observation = Stayed(T, points, surface).observation()
     missing_M = ~observation.covered
     return observation.outliers, Part.of(surface, missing_M) if missing_M.any() else None

@@ -119,14 +119,9 @@ class Repair(ExplainedRegistration):
         unit: str,
         enactments: Sequence[Enactment] = (),
     ) -> Repair:
-        """Put a registration right, if it is wrong.
+        """Put a registration right, if it is off by more than the limit; enactments of its diagnosis save the search.
 
-        Args:
-            outcome: in the target's frame, as the clouds are.
-            method: of the registration, None for the model's ICP, or `GIVEN`. A local one that was named refines the
-                hypotheses; else, the likelihood does by which they were found.
-            limit: how far the pose may be off, in the unit of the points.
-            enactments: of the diagnosis of this registration, whose hypotheses are taken; else they are sought.
+        A local method that was named refines the hypotheses; else, the likelihood does by which they were found.
         """
         frame, T_init, T = clouds.frame, clouds.T_target_source_init, outcome.T_target_source
         diagnoser, tolerance, T_registered = model.diagnoser, limit / frame.diameter, frame.pose_outside(T) @ T_init

@@ -1,8 +1,6 @@
-"""The probability that one pose is off by more than a tolerance, from a re-enactment's hypotheses of the true pose.
+"""The probability that a pose is off by more than any tolerance, by a re-enactment's hypotheses of the true pose.
 
-It is a logistic regression on a few numbers that are relative to the tolerance, so that any tolerance may be asked for.
-Where a registration ended at the pose, boosted trees on descriptors of the pair have a say, too: they know how far it
-moved, which a pose that is given, or takes the place of another, does not tell.
+It is a logistic regression on numbers relative to the tolerance; trees on descriptors judge registered poses, too.
 """
 
 from __future__ import annotations
@@ -90,10 +88,7 @@ class ResultJudge:
         return replace(judge, trees=BoostedQuestion.fit(np.concatenate(inputs), off, "result", monotonic=signs))
 
     def probability(self, evidence: Evidence, tolerance: float, described_N_F: np.ndarray | None = None) -> np.ndarray:
-        """Return the probabilities (N,) that the poses are off by more than the tolerance (diameters).
-
-        With descriptors, registrations ended there, of which the trees know more.
-        """
+        """Return the probabilities (N,) of poses to be off by more than the tolerance; descriptors if registered."""
         log_odds_N = self._log_odds(evidence, tolerance)
         if self.trees is not None and described_N_F is not None:
             log_odds_N = (log_odds_N + self.trees.log_odds(self._inputs(log_odds_N, tolerance, described_N_F))) / 2

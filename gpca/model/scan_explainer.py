@@ -1,9 +1,7 @@
 """Explains the registration of two scans of any size without a model.
 
-Both clouds are partial, so classifiers trained on whole objects do not apply. The probability of a failure is a
-logistic regression on two numbers, fitted to development scenes (docs/real_world.md). The first is the weight, by their
-fit, of the poses that are farther from the result than the limit. The second is the distance between partners at the
-result: two samples of one surface, one point per voxel, lie about 0.6 voxels apart; crossing surfaces, about 1.1.
+The probability of a failure is a logistic regression, fitted to development scenes (docs/real_world.md), on the weight
+of the poses that are farther from the result than the limit, and on the distance between partners at the result.
 """
 
 from collections.abc import Sequence
@@ -61,21 +59,12 @@ def explain_scans(
     """Register a scan to a scan, and judge whether that may have failed. The same clouds give the same numbers.
 
     Args:
-        source_points, target_points: (N, 3) arrays, or Open3D clouds, of any extent.
-        T_target_source_init: (4, 4) initial pose; by default, the identity.
-        unit: unit of points, poses, voxel and limit: ``m``, ``cm`` or ``mm``.
+        source_points, target_points: (N, 3) arrays, or Open3D clouds, in the `unit` of poses, voxel and limit, too.
         voxel: edge length of the voxels to which both are thinned; by default, chosen from the point spacing.
-        method: registration method (docs/registration.md); by default, ICP: point-to-plane, or point-to-point if a
-            scan is flat.
+        method, estimator: of docs/registration.md; by default, ICP, and none.
         limit: error above which the result is wrong, root mean square over the common surface; by default, 0.2 m or
             two voxels, whichever is more, but at most 5 % of the target's extent.
         T_target_source: (4, 4) pose to be judged; nothing is registered then. It is the initial pose, too, by default.
-        source_unit: unit of the source's points, if another one; they are converted first.
-        estimator: uncertainty estimator (docs/registration.md) that needs no training registrations; None skips it.
-
-    Raises:
-        InputError: too few points with a measurement, points on one line, a pose that is not rigid, voxels that leave
-            too few points, a limit that is no length, unknown method or estimator, or missing package.
     """
     started = perf_counter()
     given = source_points, target_points, T_target_source_init, unit, voxel, method, source_unit, limit, T_target_source
@@ -146,10 +135,7 @@ def registered_scans(
     limit: float | None = None,
     T_target_source: np.ndarray | None = None,
 ) -> tuple[Scans, CanonicalFrame, np.ndarray, Outcome, str, float, list[str]]:
-    """Return thinned scans, the target's frame, the initial pose, the registration, its method and limit, and notes.
-
-    The arguments are those of :func:`explain_scans`.
-    """
+    """Return thinned scans, the target's frame, the initial pose, the registration, its method and limit, and notes."""
     T_given = None if T_target_source is None else np.array(T_target_source, np.float64)
     T_init = T_target_source_init if T_target_source_init is not None or T_given is None else T_given
     T_init = np.eye(4) if T_init is None else np.array(T_init, np.float64)
@@ -223,10 +209,7 @@ def weights_and_errors(
 def evidence_at(
     scans: Scans, poses: Sequence[PossiblePose], T_found: np.ndarray, limit: float, *T_also: np.ndarray
 ) -> Evidence:
-    """Gather what speaks for a failure of a result, with a limit in units of the extent.
-
-    With further poses, it speaks for a failure of all of them.
-    """
+    """Gather what speaks for a failure of a result, and of further poses, with a limit in units of the extent."""
     at_result = scans.outcome(T_found)
     weight_k, error_k = weights_and_errors(scans, poses, T_found, *T_also)
     log_error_k = np.log(np.hypot(error_k, OWN_ERROR * scans.voxel) / limit)

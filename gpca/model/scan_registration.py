@@ -59,10 +59,7 @@ UPRIGHT = 0.9  # cosine of the largest angle between the planes of flat scans
 
 
 def voxel_size(clouds: Mapping[str, np.ndarray], unit: str) -> float:
-    """Choose the edge of the voxels for scans (N, 3), in their unit.
-
-    It is at least twice the larger median distance between neighbors, and leaves at most `MOST_VOXELS` points per scan.
-    """
+    """Choose the edge of voxels for scans (N, 3): two spacings of the points, with at most `MOST_VOXELS` per scan."""
     spacings = []
     for name, points in clouds.items():
         spacing = _median_gap(points) or _median_gap(np.unique(points, axis=0))
@@ -102,11 +99,7 @@ class PossiblePose(NamedTuple):
 
 
 class VoxelICP:
-    """ICP to a target (M, 3) with one point per voxel, coarse to fine and at the finest level alone: the better counts.
-
-    The coarsest level finds more of the poses that are far off, and loses some that are near. Without normals (M, 3) it
-    is point-to-point.
-    """
+    """ICP to a target (M, 3), coarse to fine and at the finest level; the better counts. Flat without normals."""
 
     def __init__(self, target: np.ndarray, normals: np.ndarray | None, voxel: float) -> None:
         self._reach = COARSE_TO_FINE[-1] * voxel
@@ -176,10 +169,8 @@ class Scans:
     def misfit(self, T: np.ndarray) -> float:
         """Return how badly both scans fit at a pose: the mean over their points, from 0 to 1.
 
-        The nearest point counts if its normal agrees, by the squared distance from its plane; two walls that cross or
-        slide along each other are close, but not alike. Points where the other scan may have seen nothing count
-        little, or a pose would fit the better, the more the scans overlap there. Flat scans count by the squared
-        distance, and in full.
+        The nearest point counts if its normal agrees, by the squared distance from its plane; points where the other
+        scan may have seen nothing count little. Flat scans count by the squared distance, and in full.
         """
         source_normals, target_normals = self._normals
         moved = transform(T, self.source)
@@ -234,11 +225,7 @@ class Scans:
         return moved[near_N] if near_N.sum() >= FEWEST_POINTS else moved
 
     def poses(self, T_found: np.ndarray, same: float) -> list[PossiblePose]:
-        """Return poses that may be true, the best first; the result is always among them.
-
-        They are the ends of other registrations and of a search, refined on all voxels. Of those that put what both
-        scans show no farther apart than `same`, one is left.
-        """
+        """Return poses that may be true, refined, the best first and none within `same`; the result is among them."""
         xi_n_6 = generator("scans", "starts").normal(size=(RUNS, 6))
         starts_n = exp(xi_n_6 * start_deviation(START_ROTATION_DEG, START_TRANSLATION))
         T_n = [T_found, *self._icp.register(_drawn(self.source, RUN_POINTS, "runs"), starts_n)[0]]

@@ -29,10 +29,7 @@ def repair_scans(
     unit: str = "m",
     **options: Any,
 ) -> Repair:
-    """Register a scan to a scan and, if the result may be wrong, put it right where another pose is called nominal.
-
-    The arguments are those of :func:`gpca.model.scan_explainer.explain_scans`, without the estimator.
-    """
+    """Register as :func:`explain_scans` does, and put a wrong result right where another pose is nominal."""
     started = perf_counter()
     scans, frame, T_init, outcome, method, limit, notes = registered_scans(
         source_points, target_points, T_target_source_init, unit, **options

@@ -104,11 +104,7 @@ class Scene:
 def packed_pair(
     target: np.ndarray, source: np.ndarray, T_found: np.ndarray, reach: float, diameter: float, unit: str
 ) -> dict[str, object]:
-    """Return the two clouds of a registration as JSON values, without hypotheses.
-
-    Lengths are in diameters of the target, except ``diameter`` itself, which is in `unit`. `T_found` maps the source
-    from its initial pose to the result; from the distance `reach` on, all points get the same color.
-    """
+    """Return two clouds and a result as JSON values in diameters; from `reach` on, all points get one color."""
     radii = [np.linalg.norm(points, axis=1) for points in (target, transform(T_found, source))]
     radius = max(float(np.quantile(radius, 0.98)) for radius in radii)  # a few far points are ignored
     return {

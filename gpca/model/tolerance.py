@@ -39,15 +39,7 @@ class Tolerance:
         return tolerance
 
     def length(self, target: np.ndarray, diameter: float, unit: str) -> float:
-        """Return the distance that it allows between a point at the pose and at the true pose, in `unit`.
-
-        For an angle, it is the mean distance by which a turn about an axis through the center moves the points.
-
-        Args:
-            target: (M, 3) in its canonical frame, in diameters.
-            diameter: of the target, in `unit`.
-            unit: unit of the clouds.
-        """
+        """Return the distance it allows a point of a target (M, 3) in diameters; of an angle, the mean by a turn."""
         if self.unit == SHARE:
             length = self.value / 100 * diameter
         elif self.unit == ANGLE:

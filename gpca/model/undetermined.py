@@ -119,18 +119,12 @@ def lying_on(surface: ModelSurface, points: np.ndarray, noise: float) -> np.ndar
 
 
 def undetermined_at(points: np.ndarray, surface: ModelSurface, open_ends: bool = False) -> Undetermined:
-    """Return what is not determined of a pose that takes observed points (N, 3) to a surface, on which they lie.
-
-    With `open_ends`, the surface may go on where it was not seen.
-    """
+    """Return what is not determined of a pose that takes observed points (N, 3) to a surface."""
     return Undetermined.of(Holder(surface.points, surface.tree, open_ends).freedom(points))
 
 
 def elementary(twists_k_6: np.ndarray, metric_6_6: np.ndarray) -> list[np.ndarray]:
-    """Return slides, and turns without them, that span the same motions (k, 6), of unit displacement, about the center.
-
-    A twist's displacement is that of its rotation and that of its translation, since the center is that of the points.
-    """
+    """Return slides, and turns without them, that span motions (k, 6) about the center of the points."""
     if not len(twists_k_6):
         return []
     turning_k_6 = twists_k_6 * np.repeat([1.0, 0.0], 3)

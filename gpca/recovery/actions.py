@@ -1,7 +1,4 @@
-"""Actions of a robot on a failed registration, by name, and what it can observe without the true pose.
-
-An action maps the robot's state (:class:`Holding`) to a new one, from which the registration is repeated.
-"""
+"""Actions of a robot on a failed registration, by name, and what it can observe without the true pose."""
 
 from __future__ import annotations
 
@@ -82,10 +79,7 @@ Action = Callable[..., Holding]
 def reinitialize(
     holding: Holding, robot: Robot, random: np.random.Generator, starts: int = 64, posterior: bool = False
 ) -> Holding:
-    """Search all orientations by ICP with a larger reach, and start from the best of the results.
-
-    With `posterior`, the probable poses of the re-enactment's search are among them.
-    """
+    """Search all orientations by ICP with a larger reach, perhaps with probable poses; start from the best result."""
     poses = search(holding, robot, random, starts)
     return best_start(holding, robot, [*poses, *(probable(holding, robot, random) if posterior else ())])
 
@@ -157,10 +151,7 @@ def look_around(
     azimuths: int = 8,
     elevations_deg: Sequence[float] = (20.0, 45.0, 70.0),
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return viewpoints ``T_world_camera`` (n, 4, 4), and which model points were and would be seen from them.
-
-    They surround the measured points, since the estimated center may be anywhere.
-    """
+    """Return viewpoints (n, 4, 4) around the measured points, and which model points were and would be seen."""
     from gpca.frames.shots import candidates, expected_surface
     from gpca.frames.situations import coarse
 
@@ -204,12 +195,9 @@ def action_of(name: str, settings: Mapping[str, object]) -> Action:
 def observe(holding: Holding, record: dict, robot: Robot, random: np.random.Generator) -> np.ndarray:
     """Return the numbers `OBSERVED` of a registration; lengths are in diameters.
 
-    Distances are those of the pair (the registration's row, see :func:`gpca.pairs.synthesis.align_pair`) after ICP, in
-    both directions: median and 90th percentile. Thickness is the measured cloud's, by local planes; on_model, explained
-    and hidden are the values of :func:`gpca.frames.shots.agreement`. Rotation and translation are the motion of the
-    model by ICP. Rivals are other poses, found by a short search: the gain in agreement of the best one, its distance,
-    and the share of results elsewhere. A right pose is found again from other orientations; a wrong one loses to its
-    rivals.
+    Distances after ICP are median and 90th percentile; thickness is the measured cloud's, by local planes; on_model,
+    explained and hidden are of :func:`gpca.frames.shots.agreement`; rotation and translation are the motion by ICP.
+    Rivals are other poses of a short search: gain in agreement of the best, its distance, share of results elsewhere.
     """
     from gpca.alignment.pose_error import adds_error
     from gpca.pairs.distances import LocalPlanes

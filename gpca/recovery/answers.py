@@ -117,10 +117,7 @@ def learn_explainers(
     source: str,
     seed: int,
 ) -> LoopExplainers:
-    """Train the encoder and fit every explainer on the split ``train``; the other split is for calibration.
-
-    Remedies of so many training samples are run, at most; Monte-Carlo ICP is slow.
-    """
+    """Train the encoder and fit every explainer on the split ``train``; the other split is for calibration."""
     train, held_out = (registrations.subset(registrations.rows(split)) for split in ("train", "test"))
 
     @cache

@@ -42,10 +42,7 @@ def regression() -> Any:
 def learn_gate(
     observed_N_F: np.ndarray, failed_N: np.ndarray, table_N: Sequence[object], false_alarms: float
 ) -> FailureGate:
-    """Train a gate; its threshold is set on good registrations, each judged by a classifier without their table.
-
-    Raises InputError for failed, or good, registrations from fewer than two tables.
-    """
+    """Train a gate; its threshold is set on good registrations, each judged by a classifier without their table."""
     good_N = ~failed_N
     _, group_N = np.unique([str(table) for table in table_N], return_inverse=True)
     for kind, mask_N in (("failed", failed_N), ("good", good_N)):
@@ -80,10 +77,7 @@ class Trial:
 
 
 class Chances:
-    """A logistic regression per action, and one for doing nothing, on standardized features.
-
-    An action that always or never succeeded gets the rate of Laplace's rule of succession.
-    """
+    """A logistic regression per action and for doing nothing; Laplace's rate for one that always or never succeeded."""
 
     def __init__(self, trials: Sequence[Trial], actions: Sequence[str]) -> None:
         self._models: dict[str, Any] = {}
@@ -113,9 +107,7 @@ class ExpectedUtility:
     """Takes the action with the largest expected gain, if it is positive.
 
     A right pose is worth 1. If the pose is right with probability p, and action a makes a wrong one right with
-    probability p_a, the action gains (1 - p) p_a - p b - c_a over doing nothing, where b is the cost of acting
-    needlessly. The k actions with the largest p_a also have the largest chance that any of them helps (if they are
-    independent given the features), so that for equal costs one order is best for every budget.
+    probability p_a, it gains (1 - p) p_a - p b - c_a, where b is the cost of acting needlessly.
     """
 
     chances: Chances  # p and p_a, learned on the training tables

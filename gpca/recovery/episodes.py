@@ -1,8 +1,4 @@
-"""Episodes: registrations disturbed by a known cause, failed or fine, and everything that is tried about each.
-
-The pose of a failure is wrong; without its cause, the same registration succeeds. An action gives the same result
-whichever policy takes it after the same actions, so every outcome is kept.
-"""
+"""Registrations disturbed by a known cause, failed or fine, and every outcome of what is tried about each."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -97,10 +93,7 @@ Started = tuple[Situation, Attempt]
 
 
 class Episode:
-    """A registration that failed, or one that did not, and everything that was tried about it.
-
-    Its error is wrong from `success` diameters on; `tries` were made for all failures of its cause.
-    """
+    """A registration and everything that was tried about it; wrong from an error of `success` diameters on."""
 
     def __init__(self, number: int, situation: Situation, start: Attempt, success: float, tries: int = 1) -> None:
         self.number, self.situation, self.tries = number, situation, tries
@@ -144,11 +137,7 @@ def is_right(attempt: Attempt | None, success: float) -> bool:
 
 
 def find_episodes(situations: Situations, settings: LoopSettings) -> list[Episode]:
-    """Draw situations of every cause until enough of their registrations have failed for it, and enough are good.
-
-    Each situation gives one good registration at most: the disturbed one if it is right, or else that without the
-    cause. The failures of a cause come first. Raises InputError for no failure at all.
-    """
+    """Draw situations until enough registrations failed by each cause, which come first, and enough are good."""
     episodes: list[Episode] = []
     tries: dict[str, int] = {}
     for cause in CONCEPTS:
@@ -175,11 +164,7 @@ def find_episodes(situations: Situations, settings: LoopSettings) -> list[Episod
 def _try_situation(
     situations: Situations, cause: str, number: int, settings: LoopSettings, misplaced: int
 ) -> tuple[Started | None, Started | None, int]:
-    """Register a disturbed situation, and the clean one where that failed; of bad poses, until one fails.
-
-    A pose error changes nothing but ICP's start, so several are tried on one measurement and estimate. Returns the
-    failure by the cause, and a good registration, each None where there is none; how many were made.
-    """
+    """Return the failure by the cause, a good registration, each None where there is none, and how many were made."""
     disturbed, clean = situations.draw(cause, cause, number)
     start: Attempt | None = None
     if cause != POSE:

@@ -1,7 +1,4 @@
-"""The closed loop: policies of recovery on the same failures, with the same budget of actions.
-
-Each policy also says what it would do about registrations that did not fail; nothing is done about those.
-"""
+"""The closed loop: policies on the same registrations, with the same budget; good ones are left as they are."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field

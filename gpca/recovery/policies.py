@@ -1,8 +1,4 @@
-"""Recovery policies by name: functions that choose the next action for a failed registration.
-
-A policy is given that the pose is wrong unless it recognizes failures itself or asks a gate. Only ``oracle``, an upper
-bound, is given the cause.
-"""
+"""Recovery policies by name: functions that choose the next action; only ``oracle`` is given the cause."""
 
 from __future__ import annotations
 
@@ -189,11 +185,7 @@ def follow_sequence(order: Order, reason: str = "next of a fixed sequence") -> M
 def best_order(
     actions: Sequence[str], costs: Mapping[str, float], solved: Sequence[Callable[[Order], bool]], budget: int
 ) -> Order:
-    """Return the greedy order of all actions: each solves the most of the remaining failures.
-
-    `solved` says of each whether a sequence solves it whose earlier actions did not. Ties go to the cheaper action,
-    then to the first. Actions later than the budget are not compared.
-    """
+    """Return the greedy order of actions: each solves most of the remaining failures; ties go to the cheaper one."""
     order: Order = ()
     left, remaining = list(solved), list(actions)
     while remaining:

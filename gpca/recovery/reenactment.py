@@ -1,8 +1,4 @@
-"""A robot's re-enactment of its own registration: hypotheses of the true pose and the effect of each cause.
-
-It follows :mod:`gpca.reenactment`. The shots add two facts to the pair of clouds: where the camera looked through a
-pose's surface, and which surface no camera has seen.
-"""
+"""A robot's re-enactment of its own registration: where it looked through a pose, and what no camera has seen."""
 
 from __future__ import annotations
 
@@ -44,12 +40,7 @@ class Appearance:
         ]
 
     def explained(self, T_world_object: np.ndarray, reach_m: float) -> float:
-        """Return the share of pixels that agree with a pose, among those that show the object or should.
-
-        A pixel agrees if the object's measured depth equals the mesh's within `reach_m`. It disagrees if the object is
-        seen but the mesh is absent or elsewhere, or if the camera looked through the mesh at something behind it.
-        Pixels with something in front of the mesh do not count.
-        """
+        """Return the share of pixels, of those that show the object or should, whose depth agrees with a pose."""
         agreeing = judged = 0
         for T_world_camera, rays, depth_m, is_object in self._views:
             rendered_m = self._mesh.along(rays, inverse(T_world_object) @ T_world_camera).depth_m
@@ -138,11 +129,7 @@ def believe(
 
 
 def reenact(belief: Belief, holding: Holding, shape: KnownModel, truth: CauseSettings, axes: tuple) -> CauseEffects:
-    """Register with every subset of the causes, under each hypothesis in turn.
-
-    Without noise or missing surface, the measurement is rebuilt (:func:`gpca.reenactment.enactment.rebuild`); without a
-    pose error, the registration starts from the hypothesis.
-    """
+    """Register with every subset of the causes, under each hypothesis in turn."""
     started, random, error_K_8 = perf_counter(), generator(*axes, "clouds"), []
     for hypothesis in belief.hypotheses:
         observation = observe(belief.observed, hypothesis, shape.surface, shape.scale, random)
@@ -155,10 +142,7 @@ def reenact(belief: Belief, holding: Holding, shape: KnownModel, truth: CauseSet
 
 
 def seen_surface(holding: Holding, shape: KnownModel, hypothesis: Hypothesis, noise: float) -> np.ndarray:
-    """Return which model points (M,) were measured by a shot, with noise in diameters, under a hypothesis.
-
-    Such a point faces the camera, and its pixel shows the object at the expected depth.
-    """
+    """Return which model points (M,) face a camera of a shot that measured them, with noise in diameters."""
     d, T = shape.diameter_m, _placed(holding, shape, hypothesis.T)
     placed_m, normals = transform(T, d * shape.surface.points), rotate(T, shape.normals)
     reach_m = d * (NEAR + 2 * noise)

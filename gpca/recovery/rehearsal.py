@@ -37,10 +37,7 @@ def policy_inputs(observed_F: np.ndarray, answer: Answer) -> np.ndarray:
 def rehearse(
     episodes: Sequence[Episode], actions: Mapping[str, Action], explainer: str, explain: Explain, settings: LoopSettings
 ) -> Rehearsal:
-    """Try every action on every failure, and one more where that did not help.
-
-    The second action is each of the others in turn. Registrations that did not fail get no action.
-    """
+    """Try every action on every failure, and where that did not help one more, each of the others in turn."""
     names = tuple(actions)
     taken: list[tuple[Episode, tuple[str, ...]]] = []
     for episode in episodes:
@@ -80,10 +77,7 @@ def rehearsed_gate(episodes: Mapping[str, Sequence[Episode]], false_alarms: floa
 
 
 def robot_policy(recovery: Mapping, rehearsal: Rehearsal | None) -> RecoveryPolicy:
-    """The thresholds that the section declares, and that of uncertainty by the rehearsed failures unless declared.
-
-    Without a rehearsal no policy queues anything.
-    """
+    """The declared thresholds; that of uncertainty by the rehearsed failures unless declared, infinite without any."""
     bald_N = np.array([rehearsal.bald[episode.number] for episode in rehearsal.failures] if rehearsal else [np.inf])
     attempts = recovery["loop"]["budget"]
     return RecoveryPolicy.of_settings(recovery["thresholds"], recovery["treatments"], attempts, bald_N)

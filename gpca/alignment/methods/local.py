@@ -84,7 +84,6 @@ def align_by_small_gicp(
     """Run generalized ICP of small_gicp (Koide 2024).
 
     Clouds and tree are made here, because small_gicp thins plain arrays to cells of 0.25 units, a quarter of an object.
-    Noisy clouds never reach its limits of the last step, so one further step decides whether it has converged.
     """
     package = import_module("small_gicp")
     source, target = package.PointCloud(pair.source), package.PointCloud(pair.target)

@@ -110,10 +110,7 @@ def align_by_kiss_matcher(
 
 @cache
 def _in_one_thread(package: Any) -> Any:
-    """Return the package limited to one thread: several threads race, and change a pose now and then.
-
-    TBB has no variable for its threads; at its first call it starts one for each processor of the process.
-    """
+    """Return the package in one thread, as several race; TBB starts one for each processor at its first call."""
     process = os.getpid()
     allowed = os.sched_getaffinity(process)
     cube_N_3 = np.indices((6, 6, 6)).reshape(3, -1).T.astype(np.float32)

@@ -20,10 +20,7 @@ def align(
     points: Annotated[int, Bounds(minimum=FEWEST)] = 512,
     correspondence_distance: float = CORRESPONDENCE_DISTANCE,
 ) -> Outcome:
-    """Drift at most `points` of the source onto as many of the target, as every point meets every other.
-
-    `outliers` is their share, and `tolerance` the last change of the objective.
-    """
+    """Drift at most `points` of the source onto the target; `tolerance` is the last change of the objective."""
     random = generator("registration", "drift", pair.seed)
     source, target = (cloud[np.sort(random.permutation(len(cloud))[:points])] for cloud in (pair.source, pair.target))
     drift = _at_scale_1(import_module("pycpd").RigidRegistration)(

@@ -60,10 +60,7 @@ def _require_package(name: str, remedy: str) -> None:
 
 
 def make_method(name: str, settings: Mapping[str, object] | None = None) -> Callable[[Pair], Outcome]:
-    """Return a method as a function from pairs to outcomes; a failure becomes an outcome at the initial pose.
-
-    It runs in one thread, because Open3D sums and draws random numbers in the order in which its threads end.
-    """
+    """Return a method as a function from pairs to outcomes, in one thread, as Open3D sums in the order of threads."""
     from threadpoolctl import ThreadpoolController
 
     settings = dict(settings or {})

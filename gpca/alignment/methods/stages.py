@@ -1,9 +1,4 @@
-"""ICP as a sequence of exchangeable stages: select, match, reject, weigh, minimize; variants of it, and trimmed ICP.
-
-The variants are those that Rusinkiewicz & Levoy (2001) compare, one stage at a time: sampling, rejection, weighting.
-All minimize distances to planes, as theirs. Normals of both clouds have to point to the same side of the surface
-(:func:`gpca.alignment.features.estimate_normals`).
-"""
+"""ICP as exchangeable stages, variants of one stage at a time (Rusinkiewicz & Levoy 2001), and trimmed ICP."""
 
 from __future__ import annotations
 
@@ -133,11 +128,7 @@ def align_trimmed(
     correspondence_distance: float = CORRESPONDENCE_DISTANCE,
     max_iterations: int = MAX_ITERATIONS,
 ) -> Outcome:
-    """Align the share `overlap` of the source that fits best; with 0, find that share ξ too (Chetverikov et al. 2002).
-
-    The objective is ψ(ξ) = e / ξ^(1+λ), e the mean square of the trimmed distances. `correspondence_distance` only
-    measures the outcome.
-    """
+    """Align the share that fits best, or find it by ψ(ξ) = e / ξ^(1+λ), e the mean square (Chetverikov et al. 2002)."""
 
     @cache
     def run(share: float) -> tuple[np.ndarray, Matches, str]:
@@ -175,11 +166,7 @@ def sample_at_random(pair: Pair) -> np.ndarray:
 
 
 def sample_normal_space(pair: Pair) -> np.ndarray:
-    """Return the rows of a share of the source's points, even over the directions of their normals.
-
-    There is one point of each direction in turn, so that flat parts get no more than others. The directions are on a
-    Fibonacci spiral; each normal counts to the nearest.
-    """
+    """Return rows of the source, one of each direction of normals in turn: flat parts get no more than others."""
     order_N = generator("sampling", "normal_space", pair.seed).permutation(len(pair.source))
     d_D = np.arange(DIRECTIONS) + 0.5
     polar_D, azimuth_D = np.arccos(1 - 2 * d_D / DIRECTIONS), np.pi * (1 + 5**0.5) * d_D

@@ -1,12 +1,4 @@
-"""TEASER (Yang et al. 2021): its decoupled solver, at a scale of 1, on mutual matches of FPFH features.
-
-Differences between two correspondences do not depend on the translation, and their lengths not on the rotation:
-
-1. two correspondences agree if their differences are equally long within the noise;
-2. the largest set in which all agree is a clique;
-3. its differences give the rotation, by graduated non-convexity on truncated least squares (GNC-TLS);
-4. its rotated points give the translation, by voting for each coordinate.
-"""
+"""TEASER (Yang et al. 2021): its decoupled solver, at a scale of 1, on mutual matches of FPFH features."""
 
 import numpy as np
 
@@ -28,10 +20,7 @@ MOST_BRANCHES = 20_000  # limit of the clique search: counted, not timed, to be 
 
 
 def solve(source_n_3: np.ndarray, target_n_3: np.ndarray, noise: float) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return the pose of corresponding points and the rows of those that agree with it, or None if no three agree.
-
-    `noise` bounds the error of a right correspondence.
-    """
+    """Return the pose and the rows of correspondences that agree within `noise`, or None if no three do."""
     from scipy.spatial.distance import cdist
 
     agreeing_n_n = np.abs(cdist(source_n_3, source_n_3) - cdist(target_n_3, target_n_3)) <= 2 * noise
@@ -48,10 +37,7 @@ def solve(source_n_3: np.ndarray, target_n_3: np.ndarray, noise: float) -> tuple
 
 
 def gnc_rotation(source_m_3: np.ndarray, target_m_3: np.ndarray, bound: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the rotation (3×3) that minimizes Σ min(|b - R a|², bound²), and weights (m,), 1 for inliers.
-
-    Graduated non-convexity (Yang et al. 2020) deforms a convex cost step by step into the truncated one.
-    """
+    """Minimize Σ min(|b - R a|², bound²) by graduated non-convexity (Yang et al. 2020): R, and weights (m,)."""
     limit = bound**2
     weights_m = np.ones(len(source_m_3))
     mu, before = 0.0, np.inf
@@ -74,10 +60,7 @@ def gnc_rotation(source_m_3: np.ndarray, target_m_3: np.ndarray, bound: float) -
 
 
 def vote(shifts_n: np.ndarray, bound: float) -> float:
-    """Return the t that minimizes Σ min((s - t)², bound²) over shifts (n,): the mean of the best set of inliers.
-
-    The set of t changes only where a shift enters or leaves the bound, so every set is tried.
-    """
+    """Return the t that minimizes Σ min((s - t)², bound²) over shifts (n,): every set of inliers is tried."""
     events = np.sort(np.concatenate([shifts_n - bound, shifts_n + bound]))
     inlier_e_n = np.abs(shifts_n - (events[1:] + events[:-1])[:, None] / 2) <= bound
     inlier_e_n = inlier_e_n[inlier_e_n.any(axis=1)]
@@ -88,11 +71,7 @@ def vote(shifts_n: np.ndarray, bound: float) -> float:
 
 
 def largest_clique(adjacent_n_n: np.ndarray, most_branches: int = MOST_BRANCHES) -> tuple[np.ndarray, bool]:
-    """Return the sorted nodes of the largest clique, and whether it is certain that none is larger.
-
-    Branch and bound over bit sets with greedy colors (Tomita & Seki 2003; San Segundo et al. 2011). The adjacency is
-    symmetric; its diagonal is ignored.
-    """
+    """Return the largest clique by branch and bound with greedy colors (Tomita & Seki 2003), and if it is certain."""
     adjacent_n_n = adjacent_n_n & ~np.eye(len(adjacent_n_n), dtype=bool)
     order = np.argsort(-adjacent_n_n.sum(axis=1), kind="stable")  # colors are given to nodes of many neighbors first
     packed = np.packbits(adjacent_n_n[np.ix_(order, order)], axis=1, bitorder="little")
@@ -123,10 +102,7 @@ def largest_clique(adjacent_n_n: np.ndarray, most_branches: int = MOST_BRANCHES)
 
 
 def _colored(candidates: int, neighbors: list[int]) -> list[tuple[int, int]]:
-    """Color the candidates so that neighbors differ, and list (node, color) by color.
-
-    A clique among the candidates up to an entry of the list has at most as many nodes as its color.
-    """
+    """List (node, color) by color, neighbors apart; a clique up to an entry has at most as many nodes as its color."""
     colored, color = [], 0
     while candidates:
         color += 1
@@ -147,11 +123,7 @@ def align(
     correspondence_distance: float = CORRESPONDENCE_DISTANCE,
     feature_neighbors: int = MOST_NEIGHBORS,
 ) -> Outcome:
-    """Return the pose on which the largest set of matches agrees.
-
-    `noise` bounds a right match's error, in diameters: about the spacing of the points. TEASER's authors advise some
-    hundreds of matches.
-    """
+    """Return the pose on which most matches agree; `noise`, in diameters, bounds a right match's error."""
     _, features = fpfh_of_pair(pair, feature_radius, feature_neighbors)
     source_N_33, target_P_33 = (each.data.T for each in features)
     rows_n_2 = mutual_matches(source_N_33, target_P_33, most_matches)
