@@ -8,8 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from string import Template
 from tempfile import TemporaryDirectory
-from textwrap import fill
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from gpca.errors import InputError
 from gpca.io.files import require_apart, whole_file, write_text
@@ -31,25 +30,18 @@ COUNTS = ("good", "samples", "families")
 LARGEST_BYTES = 8 * 10**6  # of the model file in every installation
 LICENSES = Path(__file__).with_name("licenses.yaml")
 CARD = Path(__file__).with_name("card.md")  # template
-UNBROKEN: Any = {"break_long_words": False, "break_on_hyphens": False}
 REMEDY = "ship a model from the folder of the run that made it"
 _TRAINING_FILE = re.compile(r"/(model_causes|registrations)/([^/]+)/seed\d+\.npz$")  # among the inputs of a model
 
 
-class License(NamedTuple):
-    """The license of a dataset, and where it was read."""
-
-    dataset: str
-    license: str
-    read_in: str
+License = tuple[str, str, str]  # dataset, license, and where it was read
 
 
 class Source(NamedTuple):
-    """Training objects of a model: their name and title in the run, and whether the diagnosis was trained on them."""
+    """Training objects of a model."""
 
-    name: str
     title: str
-    diagnosed: bool
+    diagnosed: bool  # whether the diagnosis was trained on them
     objects: int | str  # their number; a dash without the file of the objects
     licenses: list[License]
 
@@ -61,7 +53,7 @@ def _sources(model: Path, record: Mapping, title: str) -> Iterator[Source]:
         raise InputError(record_path(model), "lists nothing that a model learns from", REMEDY)
     for kind, name in files:
         objects = model.parent / f"objects/{name}.npz"
-        made = _provenance(objects)
+        made = read_json(record_path(objects), "a provenance record", REMEDY)
         settings = made["settings"]
         entry = settings.get("entry", {"title": title, "stand_in": "datasets" not in settings})
         if entry.get("stand_in"):
@@ -72,13 +64,13 @@ def _sources(model: Path, record: Mapping, title: str) -> Iterator[Source]:
         ]
         licenses = list(dict.fromkeys(license for origin in origins for license in licenses_of(origin, objects)))
         number = len(ObjectClouds.load(objects)) if objects.is_file() else "–"
-        yield Source(name, entry["title"], kind == "model_causes", number, licenses)
+        yield Source(entry["title"], kind == "model_causes", number, licenses)
 
 
 def licenses_of(origin: str, objects: Path) -> list[License]:
     """Return the licenses of the datasets of a file or an address."""
     licenses = [
-        License(dataset, entry["license"], entry["known"])
+        (dataset, entry["license"], entry["known"])
         for dataset, entry in load_own_yaml(LICENSES).items()
         if any(word in origin for word in entry["found"])
     ]
@@ -88,21 +80,9 @@ def licenses_of(origin: str, objects: Path) -> list[License]:
     return licenses
 
 
-def _provenance(path: Path) -> dict:
-    record = read_json(record_path(path), "a provenance record", REMEDY)
-    for name in ("inputs_sha256", "settings", "code"):
-        if not isinstance(record.get(name), dict):
-            raise InputError(record_path(path), f"lacks '{name}'", REMEDY)
-    return record
-
-
 def card(name: str, content: bytes, model: Model, record: Mapping, sources: Sequence[Source]) -> str:
     """Return the card in Markdown, the template with its fields; equal inputs give equal text."""
     diagnoser, code = model.diagnoser, record["code"]
-    try:
-        limits = _limits(model, record["settings"])
-    except (LookupError, TypeError, ValueError, AttributeError) as fault:
-        raise InputError("provenance of the model", f"is incomplete ({fault})", "regenerate the model") from fault
     file = {
         "file": f"`{name}`, {len(content)} bytes, format version {VERSION}",
         "SHA-256": f"`{hashlib.sha256(content).hexdigest()}`",
@@ -118,7 +98,7 @@ def card(name: str, content: bytes, model: Model, record: Mapping, sources: Sequ
             used.setdefault(license, []).append(source.title)
     licenses = [(*license, "; ".join(dict.fromkeys(titles))) for license, titles in used.items()]
     changes = sorted(record["settings"].get("model", {}).get("causes", {}).items())
-    fields = limits | {
+    fields = _limits(model, record["settings"]) | {
         "name": name,
         "concepts": ", ".join(CONCEPTS),
         "percent": "\u00a0%",
@@ -133,17 +113,7 @@ def card(name: str, content: bytes, model: Model, record: Mapping, sources: Sequ
         ),
         "changes": "\n".join(f"- `{key}: {json.dumps(value, sort_keys=True)}`" for key, value in changes) or "- none",
     }
-    paragraphs = []
-    for paragraph in CARD.read_text(encoding="utf-8").strip().split("\n\n"):
-        text = Template(paragraph).substitute(fields)
-        if paragraph[0] not in "$#":  # neither a table or a list in one field, nor a heading
-            items = re.split(r"\n(?=- )", text)
-            indent = "  " if paragraph[0] == "-" else ""
-            text = "\n".join(
-                fill(" ".join(item.split("\n  ")), 120, subsequent_indent=indent, **UNBROKEN) for item in items
-            )
-        paragraphs.append(text)
-    return "\n\n".join(paragraphs) + "\n"
+    return Template(CARD.read_text(encoding="utf-8")).substitute(fields)
 
 
 def _held_out(head: str, rows: Mapping[str, Mapping[str, float]], measures: Mapping[str, str]) -> str:
@@ -195,12 +165,8 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 def add_ship_arguments(parser: ArgumentParser) -> None:
     add = parser.add_argument
-    add(
-        "--model",
-        required=True,
-        type=Path,
-        help="model of a run, with the records of its folder, such as results/full/model.pt",
-    )
+    folder = "model of a run, with the records of its folder, such as results/full/model.pt"
+    add("--model", required=True, type=Path, help=folder)
     add("--out", required=True, type=Path, help="the model to ship, such as gpca/model/shipped.pt")
     add("--card", required=True, type=Path, help="its card, such as gpca/model/shipped.md")
 
@@ -218,12 +184,11 @@ def run_ship(options: Namespace) -> None:
     if len(content) > LARGEST_BYTES:
         fault = f"has {len(content) / 1e6:.1f} MB, more than the {LARGEST_BYTES / 1e6:g} MB allowed in the package"
         raise InputError(options.model, fault, "lower causes.train, causes.test or real_world.train")
-    record = _provenance(options.model)
+    record = read_json(record_path(options.model), "a provenance record", REMEDY)
     try:
-        sources = list(_sources(options.model, record, model.title))
-    except (LookupError, TypeError, AttributeError) as fault:
-        raise InputError(options.model.parent / "objects", f"its provenance is incomplete ({fault})", REMEDY) from fault
-    text = card(options.out.name, content, model, record, sources)
+        text = card(options.out.name, content, model, record, list(_sources(options.model, record, model.title)))
+    except (KeyError, TypeError, AttributeError) as fault:
+        raise InputError(options.model, f"has incomplete records of its run ({fault!r})", REMEDY) from fault
     with whole_file(options.out) as partial:
         partial.write_bytes(content)
     write_text(options.card, text)

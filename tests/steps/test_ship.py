@@ -120,13 +120,19 @@ def provenance(name, inputs=(MESH,), **settings):
     [
         (removed("real/model.pt"), "real/model.pt: no such model"),
         (removed("real/model.pt.provenance.json"), "model.pt.provenance.json: no such file"),
-        (written("real/model.pt.provenance.json", "{}"), "model.pt.provenance.json: lacks 'inputs_sha256'"),
+        (
+            written("real/model.pt.provenance.json", "{}"),
+            "model.pt: has incomplete records of its run (KeyError('inputs_sha256'))",
+        ),
         (provenance("real/model.pt"), "lists nothing that a model learns from"),
         (
             provenance("real/model.pt", ["real/model_causes/tiny/seed0.npz"]),
-            "provenance of the model: is incomplete ('causes'); regenerate the model",
+            "model.pt: has incomplete records of its run (KeyError('causes'))",
         ),
-        (provenance("real/objects/tiny.npz", [], entry={"title": "Tiny"}), "its provenance is incomplete ('url')"),
+        (
+            provenance("real/objects/tiny.npz", [], entry={"title": "Tiny"}),
+            "incomplete records of its run (KeyError('url'))",
+        ),
         (
             provenance("real/objects/tiny.npz", entry={"title": "Tiny", "stand_in": True}),
             "tiny.npz: contains objects that the package drew; ship a model of real objects",
