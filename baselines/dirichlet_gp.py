@@ -8,7 +8,7 @@ import numpy as np
 
 from gpca.classifier.scores import summarize_marginals
 from gpca.explainers.classifiers import known_concepts
-from gpca.explainers.interface import DrawingExplainer, ExplainerEntry, attached
+from gpca.explainers.interface import ExplainerEntry, ScoringExplainer, attached
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator
@@ -16,7 +16,7 @@ from gpca.seeds import generator
 JITTER = 1e-6
 
 
-class DirichletGP(DrawingExplainer):
+class DirichletGP(ScoringExplainer):
     """Exact GPs with RBF kernels, one scale and lengthscale per concept; a small `alpha` α_ε is confident."""
 
     def __init__(

@@ -14,7 +14,7 @@ import numpy as np
 
 from gpca.classifier.scores import summarize_draws
 from gpca.explainers.classifiers import known_concepts
-from gpca.explainers.interface import DrawingExplainer, ExplainerEntry, attached
+from gpca.explainers.interface import ExplainerEntry, ScoringExplainer, attached
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator, seed_of
@@ -101,7 +101,7 @@ class Heads:
 HeadArguments = Annotated[Any, ArgumentsOf(Heads)]  # keyword arguments passed on to it
 
 
-class HeadLearner(DrawingExplainer):
+class HeadLearner(ScoringExplainer):
     """Base of learners that draw logits from heads; `training` holds the settings of the heads."""
 
     def __init__(self, source: str, seed: int, **training: HeadArguments) -> None:

@@ -190,18 +190,6 @@ def test_latency_times_whole_commands_of_an_installed_package(tmp_path, capsys):
     assert all(value > 0 for value in said.values())
 
 
-def test_latency_compares_explanations_of_equal_scores(capsys):
-    from benchmarks import latency
-
-    latency.main(["--points", "64", "--pairs", "3", "--repeats", "3", "--draws", "400"])
-    out = capsys.readouterr().out
-    result = last_line(out)
-    assert list(result) == ["median_ms", "speedup", "speedup_all_draws", "max_score_difference"]
-    assert min(result["median_ms"], result["speedup"], result["speedup_all_draws"]) > 0
-    assert 0 < result["max_score_difference"] < 0.15  # four standard errors of two means of 400 draws
-    assert "one explanation, 64 points, 400 posterior draws, 1 thread(s)" in out
-
-
 def test_registration_ends_with_the_numbers_of_each_method(capsys):
     from benchmarks import registration
 

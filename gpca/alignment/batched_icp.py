@@ -8,9 +8,9 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from gpca.alignment.features import estimate_normals
-from gpca.alignment.icp import CONVERGED, ICP, ICPSettings, require_cloud
+from gpca.alignment.icp import CONVERGED, ICPSettings, require_cloud
 from gpca.alignment.icp_kernels import LISTED, align_all, plane_all, pull_all
-from gpca.rigid import rigid_motion, transform
+from gpca.rigid import rigid_motion
 
 MOST_LISTS = 1 << 16  # beyond that, queries in new voxels search the cells
 NO_NORMALS = np.empty((0, 3))
@@ -67,16 +67,12 @@ def make_target(points: np.ndarray, distance: float) -> Target:
 
 
 class BatchedICP:
-    """ICP to one target (P, 3), in any unit; point-to-plane and generalized ICP need normals (P, 3)."""
+    """Point-to-point ICP to one target (P, 3), in any unit, which the results and the correspondence distance share."""
 
-    def __init__(self, target: np.ndarray, settings: ICPSettings, target_normals: np.ndarray | None = None) -> None:
+    def __init__(self, target: np.ndarray, settings: ICPSettings) -> None:
         require_cloud("target cloud", target)
-        self._settings = settings
-        if settings.method == "point_to_point":
-            self._target = make_target(target, settings.correspondence_distance)
-        else:
-            self._icp = ICP(target, target_normals, settings)
-            self._tree = cKDTree(target)
+        self._iterations = settings.max_iterations
+        self._target = make_target(target, settings.correspondence_distance)
 
     def register(
         self, source: np.ndarray, T_target_source_init_n: np.ndarray, max_iterations: int | None = None
@@ -84,24 +80,11 @@ class BatchedICP:
         """Align `source` (N, 3) from poses (n, 4, 4): poses, fitness, inlier RMSE (n,); 0 iterations only measure."""
         require_cloud("source cloud", source)
         poses_n = np.array(T_target_source_init_n, np.float64)
-        if self._settings.method == "point_to_point":
-            fitness_n, rmse_n = np.empty(len(poses_n)), np.empty(len(poses_n))
-            source = np.ascontiguousarray(source, np.float64)
-            iterations = self._settings.max_iterations if max_iterations is None else max_iterations
-            align_all(source, self._target, poses_n, fitness_n, rmse_n, iterations, CONVERGED)
-            return poses_n, fitness_n, rmse_n
-        if max_iterations == 0:
-            return poses_n, *self._measured(source, poses_n)
-        runs = [self._icp.register(source, pose) for pose in poses_n]
-        fitness_n, rmse_n = np.array([(run.fitness, run.inlier_rmse) for run in runs]).T
-        return np.array([run.T_target_source for run in runs]), fitness_n, rmse_n
-
-    def _measured(self, source: np.ndarray, poses_n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        reach = self._settings.correspondence_distance
-        distance_n_N = np.stack([self._tree.query(transform(T, source))[0] for T in poses_n])
-        near_n_N = distance_n_N <= reach
-        squares_n = np.where(near_n_N, distance_n_N**2, 0).sum(axis=1)
-        return near_n_N.mean(axis=1), np.sqrt(squares_n / np.maximum(near_n_N.sum(axis=1), 1))
+        fitness_n, rmse_n = np.empty(len(poses_n)), np.empty(len(poses_n))
+        source = np.ascontiguousarray(source, np.float64)
+        iterations = self._iterations if max_iterations is None else max_iterations
+        align_all(source, self._target, poses_n, fitness_n, rmse_n, iterations, CONVERGED)
+        return poses_n, fitness_n, rmse_n
 
 
 def pulls(
@@ -119,10 +102,12 @@ def pulls(
 
 
 class BatchedPlaneICP:
-    """ICP to the planes of one target (P, 3) with normals; generalized ICP takes planes of the source too."""
+    """Point-to-plane or generalized ICP to one target (P, 3), by normals that are given or estimated."""
 
-    def __init__(self, target: np.ndarray, target_normals: np.ndarray, settings: ICPSettings) -> None:
+    def __init__(self, target: np.ndarray, target_normals: np.ndarray | None, settings: ICPSettings) -> None:
         require_cloud("target cloud", target)
+        target_normals = estimate_normals(target) if target_normals is None else target_normals
+        self._generalized = settings.method == "generalized"
         self._target = make_target(target, settings.correspondence_distance)
         # The kernel has the points in the order of its cells.
         rows_P = cKDTree(target).query(self._target.points)[1]
@@ -130,18 +115,12 @@ class BatchedPlaneICP:
         self.iterations = settings.max_iterations
 
     def register(
-        self,
-        source: np.ndarray,
-        T_target_source_init_n: np.ndarray,
-        max_iterations: int | None = None,
-        source_normals: np.ndarray | None = None,
+        self, source: np.ndarray, T_target_source_init_n: np.ndarray, max_iterations: int | None = None
     ) -> tuple[np.ndarray, ...]:
         """Align `source` (N, 3) from n initial poses (n, 4, 4), as :meth:`BatchedICP.register`."""
         require_cloud("source cloud", source)
-        source, normals = (
-            np.ascontiguousarray(rows, np.float64)
-            for rows in (source, NO_NORMALS if source_normals is None else source_normals)
-        )
+        normals = np.ascontiguousarray(estimate_normals(source)) if self._generalized else NO_NORMALS
+        source = np.ascontiguousarray(source, np.float64)
         poses_n = np.array(T_target_source_init_n, np.float64)
         iterations = self.iterations if max_iterations is None else max_iterations
         return _descend(lambda rows_m: self.sums(source, poses_n[rows_m], normals), poses_n, iterations)
@@ -156,25 +135,14 @@ class BatchedPlaneICP:
         return sums
 
 
-class SelfMadeNormals:
-    """Point-to-plane or generalized ICP to one target (P, 3) by normals of the clouds' own points."""
-
-    def __init__(self, target: np.ndarray, settings: ICPSettings) -> None:
-        require_cloud("target cloud", target)
-        self._icp = BatchedPlaneICP(target, estimate_normals(target), settings)
-        self._generalized = settings.method == "generalized"
-
-    def register(
-        self, source: np.ndarray, T_target_source_init_n: np.ndarray, max_iterations: int | None = None
-    ) -> tuple[np.ndarray, ...]:
-        """Align `source` (N, 3) from n initial poses (n, 4, 4), as :meth:`BatchedICP.register`."""
-        normals = estimate_normals(source) if self._generalized else None
-        return self._icp.register(source, T_target_source_init_n, max_iterations, normals)
+AnyICP = BatchedICP | BatchedPlaneICP
 
 
-def icp_to(target: np.ndarray, settings: ICPSettings) -> BatchedICP | SelfMadeNormals:
+def icp_to(target: np.ndarray, settings: ICPSettings) -> AnyICP:
     """Return the ICP to a target (P, 3) without normals; methods that need some estimate them."""
-    return (BatchedICP if settings.method == "point_to_point" else SelfMadeNormals)(target, settings)
+    if settings.method == "point_to_point":
+        return BatchedICP(target, settings)
+    return BatchedPlaneICP(target, None, settings)
 
 
 def register_each_to_planes(

@@ -65,7 +65,6 @@ class ICP:
 
 
 def require_cloud(name: str, points: np.ndarray) -> None:
-    """Raise an InputError unless there are at least three points (N, 3), all of them finite."""
     if len(points) < 3 or not np.isfinite(points).all():
         raise InputError(name, f"has {len(points)} points or contains NaN", "give at least 3 finite points")
 

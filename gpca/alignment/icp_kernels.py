@@ -113,7 +113,6 @@ def _list_nearest(points, starts, low, cell, cells, radius, x, y, z, listed, off
 
 @njit(**INNER_LOOP)
 def _search(points, starts, low, cell, cells, radius, x, y, z):
-    """Search the cells around a point, in a growing window."""
     window = 1
     while True:
         best, index = radius * radius, -1
@@ -146,7 +145,6 @@ def _cells_around(x, low, cell, cells, window):
 
 @njit(forceinline=True, **INNER_LOOP)
 def _points_of(starts, cells, i, j, k_low, k_high):
-    """Return the range of points of a row of cells along the last axis."""
     if k_low >= k_high:
         return 0, 0
     row = (i * cells[1] + j) * cells[2]
@@ -254,7 +252,6 @@ def _plane_sums(source, source_normals, target, normals, pose, hessian, gradient
 
 @njit(forceinline=True, **INNER_LOOP)
 def _add(hessian, gradient, row, px, py, pz, rx, ry, rz, nx, ny, nz, weight):
-    """Add the square of the residual along n, times a weight."""
     row[0], row[1], row[2] = py * nz - pz * ny, pz * nx - px * nz, px * ny - py * nx
     row[3], row[4], row[5] = nx, ny, nz
     off_plane = weight * (rx * nx + ry * ny + rz * nz)

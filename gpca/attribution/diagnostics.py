@@ -44,7 +44,6 @@ def calibration_error(p_S_C: np.ndarray, target_S: np.ndarray) -> float:
 
 
 def negative_log_likelihood(p_S_C: np.ndarray, target_S: np.ndarray) -> float:
-    """Return the mean of -ln p(true class) in nats."""
     return float(-np.log(np.maximum(p_S_C[np.arange(len(target_S)), target_S], LEAST_PROBABILITY)).mean())
 
 

@@ -52,7 +52,6 @@ def read_learner_predictions(prediction_files: Iterable[str | Path], set_files: 
 
 
 def sets_of(rows: Frame) -> dict[str, Frame]:
-    """Rows of every set, and of every shifted set together with those that are like the training."""
     alone = {name: rows[rows["set"] == name] for name in TRAINED_ON if (rows["set"] == name).any()}
     shifted = [name for name in alone if TRAINED_ON[name] != name]
     return alone | {with_training_like(name): rows[rows["set"].isin([name, TRAINED_ON[name]])] for name in shifted}
@@ -66,7 +65,6 @@ def probabilities(rows: Frame) -> tuple[np.ndarray, np.ndarray]:
 
 
 def wrong(rows: Frame) -> np.ndarray:
-    """Mask (S,) of the samples that were named wrongly, or not at all."""
     return ((rows["concept_true"] != rows["concept_predicted"]) | rows["abstained"]).to_numpy()
 
 

@@ -25,7 +25,6 @@ _OF_CONCEPTS = ("score_?*", "variance_?*", "bald", "entropy")  # further columns
 
 
 def write_predictions(path: str | Path, registrations: Registrations, attribution: Attribution) -> None:
-    """Write the prediction file that every table is made from (results/README.md)."""
     write_columns(path, _columns(registrations, attribution))
 
 
@@ -68,26 +67,22 @@ def read_predictions(path: str | Path, labels: Sequence[str] = ()) -> Frame:
 
 
 def concepts_of(predictions: Frame) -> list[str]:
-    """Return the concepts that predictions score, in the order of their columns."""
     return [name.removeprefix("score_") for name in predictions.columns if name.startswith("score_")]
 
 
 def write_timings(
     path: str | Path, registrations: Registrations, seconds_S: np.ndarray, icp_seconds_S: np.ndarray
 ) -> None:
-    """Write seconds per sample, in a file of their own, as they differ from run to run."""
     columns = {"sample": registrations.sample, "split": registrations.split}
     write_columns(path, columns | {"seconds": seconds_S, "icp_seconds": icp_seconds_S})
 
 
 def read_timings(path: str | Path, registrations: Registrations) -> tuple[np.ndarray, np.ndarray]:
-    """Return seconds (S,) and icp_seconds (S,) of the registrations."""
     rows = read_columns(path, TIMING_COLUMNS, ("seconds", "icp_seconds"))
     require_same_samples(path, rows, registrations.arrays)
     return np.asarray(rows["seconds"]), np.asarray(rows["icp_seconds"])
 
 
 def require_samples(path: str | Path, rows: Frame, keys: Iterable[str] = ("split", "sample")) -> None:
-    """Raise an InputError unless each sample of a split stands once."""
     if rows.duplicated(list(keys)).any():
         raise InputError(path, "contains a sample twice", "regenerate it")

@@ -46,7 +46,6 @@ def augrc(confidence_S: np.ndarray, wrong_S: np.ndarray, weights_B_S: np.ndarray
 
 
 def rank_correlation(one_S: np.ndarray, other_S: np.ndarray, weights_B_S: np.ndarray) -> np.ndarray:
-    """Return Spearman's ρ (B,); 0 where one of the two is constant."""
     drawn_B_1 = np.maximum(weights_B_S.sum(axis=1), 1)[:, None]
     centered = []
     for values_S in (one_S, other_S):

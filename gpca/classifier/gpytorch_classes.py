@@ -38,7 +38,6 @@ KERNELS = {
 
 
 def gpytorch_kernel(covariance: Covariance) -> gpytorch.kernels.ScaleKernel:
-    """Return gpytorch's form of a covariance."""
     batch = torch.Size([len(covariance.scale_C)])
     kernel = gpytorch.kernels.ScaleKernel(KERNELS[covariance.form](batch_shape=batch), batch_shape=batch)
     kernel.outputscale = torch.from_numpy(covariance.scale_C).float()
@@ -138,7 +137,6 @@ class SameRoots(TorchFunctionMode):
     """Inside this context, torch's roots and distances have the same bits on processors of every vendor."""
 
     def __torch_function__(self, function, types, arguments=(), keywords=None):
-        """Call the function, with replacements for roots and distances."""
         if function is torch.cdist:
             a_A_d, b_B_d = arguments[:2]
             squares_A_B = a_A_d.square().sum(dim=-1)[..., :, None] + b_B_d.square().sum(dim=-1)[..., None, :]

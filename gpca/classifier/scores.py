@@ -115,7 +115,6 @@ def score_marginals(
 
 
 def _drawn(mean_N_C: np.ndarray, deviation_N_C: np.ndarray, normal_M_C: np.ndarray, block: int) -> Iterator[np.ndarray]:
-    """Yield the draws (C, n, M) of each block of points."""
     normal_C_1_M = np.ascontiguousarray(normal_M_C.T)[:, None]
     for start in range(0, max(len(mean_N_C), 1), block):
         rows = slice(start, start + block)

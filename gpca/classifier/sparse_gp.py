@@ -68,7 +68,6 @@ def _inverse_softplus(values_C: np.ndarray) -> Tensor:
 
 
 def squared_distances(a_A_d: Tensor, b_B_d: Tensor) -> Tensor:
-    """Return |a - b|², (A, B)."""
     squares_A_1, squares_B = a_A_d.square().sum(dim=1, keepdim=True), b_B_d.square().sum(dim=1)
     return torch.addmm(squares_A_1 + squares_B, a_A_d, b_B_d.T, alpha=-2).clamp_min(0)
 

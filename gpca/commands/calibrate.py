@@ -40,7 +40,6 @@ def add_calibrate_arguments(parser: ArgumentParser) -> None:
 
 
 def run_calibrate(options: Namespace) -> None:
-    """Explain each pair, set the limits on the labels, and print what is promised."""
     path = model_path(options.model)
     require_model(path)
     rows = from_rows(options, (*COLUMNS, "label"))

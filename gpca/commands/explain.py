@@ -33,8 +33,6 @@ OF_ONE = ("html", "png", "save_pose", "out")  # outputs of one registration
 
 
 class _InsteadOfClouds(Action):
-    """An option that takes the place of all arguments without a name."""
-
     def __call__(self, parser: ArgumentParser, namespace: Namespace, values: Any, option: str | None = None) -> None:
         setattr(namespace, self.dest, values)
         for action in parser._actions:
@@ -210,7 +208,6 @@ def _length(text: str, unit: str) -> float:
 
 
 def _require_options(options: Namespace) -> None:
-    """Reject options that exclude one another."""
     if options.pairs:
         if options.source or not options.json_lines:
             fault = "has sources and targets of its own" if options.source else "prints one line for each pair"
@@ -239,7 +236,6 @@ def _require_options(options: Namespace) -> None:
 def _write(
     options: Namespace, explanation: ExplainedRegistration, names: dict[str, str], extra: dict[str, str]
 ) -> None:
-    """Print an explanation, in JSON with names and extra fields, and write its page and figure."""
     as_json = options.json or options.json_lines
     # Text contains its warnings.
     warnings = [f"warning: {line}" for line in explanation.warnings] if as_json else []

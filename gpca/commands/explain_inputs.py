@@ -60,7 +60,6 @@ def target_reader(scans: bool) -> TargetReader:
 
 
 def from_words(options: Namespace) -> list[Inputs]:
-    """Return the registrations of sources and a target of the command line."""
     units = options.unit, options.source_unit
     start = options.pose or options.init
     return [Inputs(source, options.target, start, *units) for source in options.source]

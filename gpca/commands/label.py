@@ -128,7 +128,6 @@ def _queued(options: Namespace) -> tuple[Queue, Model]:
 def _ask(
     session: Session, registrations: Registrations | Queue, question: Question, picture: Path, answers
 ) -> str | None:
-    """Show one question until it is answered; None at the end of the answers."""
     row = question.row
     split, sample = session.keys[row]
     title = f"{split} sample {sample}: {registrations.object_name[row]}"

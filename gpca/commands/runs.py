@@ -98,7 +98,6 @@ def run_check_reference(options: Namespace) -> int:
 
 
 def _snakemake(folder: Path, targets: list[str]) -> str:
-    """Return the command that makes targets of a run; a table's CSV comes with its Markdown."""
     config = Path("config", f"{folder.name}.yaml")
     option = f" --configfile {config}" if config.is_file() else ""
     return f"snakemake -j2 {' '.join(targets) or 'all'}{option}"

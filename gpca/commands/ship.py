@@ -68,7 +68,6 @@ def _sources(model: Path, record: Mapping, title: str) -> Iterator[Source]:
 
 
 def licenses_of(origin: str, objects: Path) -> list[License]:
-    """Return the licenses of the datasets of a file or an address."""
     licenses = [
         (dataset, entry["license"], entry["known"])
         for dataset, entry in load_own_yaml(LICENSES).items()
@@ -117,7 +116,6 @@ def card(name: str, content: bytes, model: Model, record: Mapping, sources: Sequ
 
 
 def _held_out(head: str, rows: Mapping[str, Mapping[str, float]], measures: Mapping[str, str]) -> str:
-    """Return a table of measures with the intervals that the model has."""
 
     def cell(row: Mapping[str, float], name: str) -> str:
         if name not in row:

@@ -3,11 +3,11 @@
 import numpy as np
 
 from gpca.classifier.settings import GPCArguments
-from gpca.explainers.interface import DrawingExplainer, ExplainerEntry
+from gpca.explainers.interface import ExplainerEntry, ScoringExplainer
 from gpca.pairs.dataset import Registrations
 
 
-class GPCA(DrawingExplainer):
+class GPCA(ScoringExplainer):
     """Gaussian Process Concept Attribution (the paper): a GPC on the embeddings of the ICP-aligned clouds."""
 
     def __init__(self, source: str, seed: int, **settings: GPCArguments) -> None:

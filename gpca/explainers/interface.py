@@ -113,7 +113,6 @@ class ScoringExplainer:
 
 
 def for_causes(explainer: type) -> type:
-    """Return the explainer with the labels of causes in place of the concepts."""
     from gpca.causes.dataset import LABELS
 
     return type(f"Cause{explainer.__name__}", (explainer,), {"labels": LABELS})
@@ -138,14 +137,6 @@ class ClassifierExplainer(ScoringExplainer):
         raise NotImplementedError
 
 
-class DrawingExplainer(ScoringExplainer):
-    """Base of explainers that draw from a posterior: scores with variances and BALD."""
-
-    def summary(self, registrations: Registrations) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return scores and variances (N, C), and BALD (N,) (Eqs. 4 to 7)."""
-        raise NotImplementedError
-
-
 def measured(
     registrations: Registrations, prefix: str, measure: Callable[[], Mapping[str, np.ndarray]]
 ) -> Registrations:
@@ -157,7 +148,6 @@ def measured(
 
 
 def attached(registrations: Registrations, name: str) -> np.ndarray:
-    """Return an attached array (S, …) as float64; InputError if it is missing."""
     if name not in registrations.attached:
         raise InputError(f"array '{name}'", "is not attached to the registrations", "see Registrations.attached")
     return np.asarray(registrations.attached[name], float)
@@ -206,7 +196,6 @@ class ExplainerEntry:
 
 
 def in_words(sees: Collection[str]) -> str:
-    """Return what a table prints, such as ``pair + motion``."""
     return " + ".join(WORDS[part] for part in PARTS if part in sees) or NOTHING
 
 

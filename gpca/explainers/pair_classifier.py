@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -12,6 +12,7 @@ from gpca.causes.truth import FAILED, NOMINAL
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
 from gpca.explainers.classifiers import BoostedQuestion
+from gpca.io.container import Container, array
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import seed_of
 
@@ -63,17 +64,13 @@ class NormalizedFeatures:
 
 
 @dataclass(frozen=True)
-class Judgment:
+class Judgment(Container):
     """The probabilities of N pairs."""
 
-    failure_N: np.ndarray  # probability that the registration failed
-    causes_N_3: np.ndarray  # probability that each concept is one of the causes
-    causes_variances_N_3: np.ndarray  # their variances over the posterior draws (Eq. 5).
-    bald_N: np.ndarray  # the largest BALD of the four classifiers, nats (Eq. 7).
-
-    def subset(self, rows: np.ndarray) -> Judgment:
-        """Return the given rows."""
-        return Judgment(*(getattr(self, field.name)[rows] for field in fields(Judgment)))
+    failure_N: np.ndarray = array("N")  # probability that the registration failed
+    causes_N_3: np.ndarray = array("N 3")  # probability that each concept is one of the causes
+    causes_variances_N_3: np.ndarray = array("N 3")  # their variances over the posterior draws (Eq. 5).
+    bald_N: np.ndarray = array("N")  # the largest BALD of the four classifiers, nats (Eq. 7).
 
 
 class PairClassifier:

@@ -25,12 +25,10 @@ def explainers(kind: str = CONCEPTS) -> dict[str, ExplainerEntry]:
 
 
 def explainer_entry(name: str, kind: str = CONCEPTS) -> ExplainerEntry:
-    """Return an explainer; an unknown name raises an InputError that lists the known ones."""
     return REGISTRIES[kind].entry(name)
 
 
 def require_settings(name: str, settings: Mapping[str, object], kind: str = CONCEPTS, reenacted: bool = False) -> None:
-    """Raise an InputError unless the explainer is known, takes these settings and has what it reads."""
     entry = explainer_entry(name, kind)
     require_arguments(f"explainer '{name}'", entry.make, 2, settings)
     if kind == CONCEPTS and entry.reads == REENACTED and not reenacted:

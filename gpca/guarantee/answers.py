@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, fields
+from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import partial
 from math import floor
 from pathlib import Path
@@ -18,7 +18,10 @@ from gpca.evaluation.conformal import ALARM, GOOD, NOT_SURE
 from gpca.evaluation.measures import ALL
 from gpca.frames.source import REAL_WORLD
 from gpca.guarantee.guarantee import STATES, calibrate, state_scores
+from gpca.io.arrays import TEXT
+from gpca.io.container import Container, array
 from gpca.io.csv_file import read_numbers, write_csv
+from gpca.io.files import Axes
 from gpca.io.frame import Frame
 from gpca.settings import OpenShare
 
@@ -51,34 +54,21 @@ class GuaranteeSettings:
 
 
 @dataclass(frozen=True)
-class Scored:
+class Scored(Container):
     """N scored samples: a sample occurs once for each model that scored it. Borderline samples are left out."""
 
-    model: np.ndarray  # (N,) name of the model. Scores of different models are never mixed.
-    source: np.ndarray
-    seed: np.ndarray
-    sample: np.ndarray
-    family: np.ndarray  # (N,) of shapes, or the scene of a depth frame
-    state: np.ndarray  # (N,) the true one, of :data:`gpca.guarantee.guarantee.STATES`
-    seen: np.ndarray  # (N,) the model was trained on this sample
-    severity: np.ndarray  # (N,) of its perturbations, as a share of the largest in any sample
-    weight: np.ndarray  # (N,) of the sample in means
-    scores: np.ndarray  # (N, 4) of nominal and of the causes
+    model: np.ndarray = array("N", TEXT)  # its name; scores of different models are never mixed
+    source: np.ndarray = array("N", TEXT)
+    seed: np.ndarray = array("N")
+    sample: np.ndarray = array("N", TEXT)
+    family: np.ndarray = array("N", TEXT)  # of shapes, or the scene of a depth frame
+    state: np.ndarray = array("N", TEXT)  # the true one, of :data:`gpca.guarantee.guarantee.STATES`
+    seen: np.ndarray = array("N")  # whether the model was trained on this sample
+    severity: np.ndarray = array("N")  # of its perturbations, as a share of the largest in any sample
+    weight: np.ndarray = array("N")  # of the sample in means
+    scores: np.ndarray = array("N 4")  # of nominal and of the causes
 
-    def __len__(self) -> int:
-        return len(self.model)
-
-    def subset(self, rows: np.ndarray) -> Scored:
-        """The given rows, or those of a mask."""
-        return Scored(*(getattr(self, field.name)[rows] for field in fields(Scored)))
-
-    @classmethod
-    def joined(cls, parts: Iterable[Scored]) -> Scored:
-        """The rows of several one after the other."""
-        parts = list(parts)
-        return cls(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(cls)))
-
-    def save(self, path: str | Path) -> None:
+    def save(self, path: str | Path, axes: Axes | None = None) -> None:
         """Write the CSV described in results/README.md."""
         import pandas as pd
 
@@ -87,7 +77,7 @@ class Scored:
         write_csv(path, pd.DataFrame(columns))
 
     @classmethod
-    def load(cls, path: str | Path) -> Scored:
+    def load(cls, path: str | Path, expected: Axes | Container | None = None) -> Scored:
         """Read the CSV."""
         rows: Frame = read_numbers(path, (*TEXTS, *NUMBERS, *SCORES), (*NUMBERS, *SCORES))
         if unknown := set(rows["state"]) - set(STATES):

@@ -116,7 +116,6 @@ def calibrate(
 
 
 def whether_failed(scores_M_K: np.ndarray) -> np.ndarray:
-    """Return scores (M, 2) of `WHETHER_FAILED`, from those of states of which the first is nominal."""
     return np.column_stack([scores_M_K[:, 0], 1 - scores_M_K[:, 0]])
 
 

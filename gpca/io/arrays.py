@@ -28,7 +28,6 @@ def save_arrays(path: str | Path, arrays: Mapping[str, np.ndarray], axes: Axes |
 
 
 def write_arrays(path: Path, arrays: Mapping[str, np.ndarray], axes: Axes | None = None) -> None:
-    """Write what :func:`save_arrays` does to a temporary file."""
     source, seed = axes or (None, None)
     of = {name: np.array(value) for name, value in (("source", source), ("seed", seed)) if value is not None}
     np.savez(path, allow_pickle=False, **arrays, **of)
@@ -102,7 +101,6 @@ def require_numbers(
 
 
 def axes_in(arrays: Mapping[str, np.ndarray]) -> Axes:
-    """Return the source and the seed that arrays name; objects of a source have no seed."""
     return str(arrays["source"]), int(arrays["seed"]) if "seed" in arrays else None
 
 
@@ -120,7 +118,6 @@ def _read(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> np.ndarray:
 
 
 def _header(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> tuple[tuple[int, ...], np.dtype]:
-    """Return shape and type of an array that is as long as its header says."""
     with archive.open(info) as stream:
         head = io.BytesIO(stream.read(_LONGEST_HEADER))  # which may claim to be gigabytes long itself
     shape, _, dtype = _HEADERS[np.lib.format.read_magic(head)](head)
@@ -130,7 +127,6 @@ def _header(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> tuple[tuple[int,
 
 
 def _checked_members(archive, path, shapes, kinds, optional, remedy) -> dict[str, zipfile.ZipInfo]:
-    """Return the member of each array, once its header is found to be right."""
     listed = archive.namelist()
     sizes: dict[str, int] = {}
     members = {}

@@ -77,7 +77,6 @@ class Container:
         return replace(parts[0], axes=None)._of_parts([(part, np.arange(len(part))) for part in parts])
 
     def _of_parts(self, parts: Sequence[tuple[Self, np.ndarray]]) -> Self:
-        """Return this container with the given rows of several."""
         declared = self.array_fields()
         samples = next(iter(declared.values())).shape[0]
         chosen: dict[str, Any] = {}

@@ -110,7 +110,6 @@ def read_columns(path: str | Path, columns: Sequence[str], numeric: Sequence[str
 
 
 def finite_number(subject: object, name: str, text: str, remedy: str = "regenerate it") -> float:
-    """Return the number in a field; `subject` and `name` locate it in messages."""
     try:
         return decimal(text.strip())
     except ValueError as fault:

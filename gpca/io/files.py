@@ -83,7 +83,6 @@ def is_name(text: str) -> bool:
 
 
 def is_title(text: str) -> bool:
-    """Return whether a text can stand in a table: a name of a few words."""
     return is_name(text) and len(text) <= LONGEST_TITLE
 
 
@@ -93,7 +92,6 @@ def _in_words(axes: Axes) -> str:
 
 
 def require_axes(path: str | Path, actual: Axes, expected: Axes | None) -> None:
-    """Raise an InputError unless a file has the expected source and seed; None accepts any."""
     if expected is not None and actual != expected:
         wanted = _in_words(expected)
         raise InputError(path, f"is of {_in_words(actual)}, not of {wanted}", f"give the file of {wanted}")
@@ -171,7 +169,6 @@ def printable(text: object) -> str:
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Write a text that is :func:`printable`, whole or not at all."""
     with whole_file(path) as partial:
         partial.write_text(printable(text), encoding="utf-8")
 
@@ -241,7 +238,6 @@ def require_page(path: Path) -> None:
 
 
 def sha256_of_file(path: str | Path) -> str:
-    """Return the hexadecimal SHA-256 of a file of any size."""
     with Path(path).open("rb") as content:
         return hashlib.file_digest(content, "sha256").hexdigest()
 

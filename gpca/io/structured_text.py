@@ -107,7 +107,6 @@ def _parse_yaml(text: str, path: Path) -> Any:
 
 
 def _size(node: yaml.Node, sizes: dict[int, int | None], path: Path) -> int:
-    """Return the number of entries of a node with all aliases expanded."""
     import yaml
 
     line = f"line {node.start_mark.line + 1}"

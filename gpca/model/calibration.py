@@ -45,7 +45,7 @@ class LabeledRegistrations:
     @classmethod
     def of(
         cls,
-        diagnoses: Sequence[Diagnosis | None],
+        diagnoses: Sequence[Diagnosis],
         labels: Sequence[str],
         groups: Sequence[str] | None = None,
         names: Sequence[str] | None = None,
@@ -59,8 +59,6 @@ class LabeledRegistrations:
         before: dict[tuple, tuple[str, str]] = {}
         kept: list[tuple[Diagnosis, str, str]] = []
         for name, diagnosis, label, group in zip(names, diagnoses, labels, groups or labels, strict=True):
-            if diagnosis is None:
-                raise InputError(name, "has no diagnosis", "explain it with one")
             # The same clouds give the same numbers, and others do not.
             key = diagnosis.result, diagnosis.start, diagnosis.unlikeness, diagnosis.expected_error
             other, earlier = before.setdefault(key, (name, label))

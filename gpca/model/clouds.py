@@ -19,7 +19,6 @@ from gpca.objects.canonical import (
     CanonicalFrame,
     bounding_center,
     canonical_cloud,
-    normals_towards_camera,
     require_cloud_points,
     thin,
 )
@@ -29,7 +28,7 @@ from gpca.rigid import require_rigid, rigid_motion, transform
 from gpca.seeds import generator
 
 if TYPE_CHECKING:
-    from gpca.alignment.batched_icp import BatchedICP
+    from gpca.alignment.batched_icp import AnyICP
 
 SAMPLED_POINTS = 16384  # points sampled on a mesh, as on the training objects
 LARGEST_POSE_BYTES = 10**5  # 16 numbers in any notation
@@ -98,7 +97,9 @@ def read_pose(path: Path) -> np.ndarray:
             array = np.load(path, allow_pickle=False).astype(np.float64)
         lengths, numbers = array.shape[-1:], array.ravel()
     else:
-        lines = [re.sub(r"[\[\](),;]", " ", line.partition("#")[0]).split() for line in _text_of(path).splitlines()]
+        with refusing(path, "is no text ({})", POSES):
+            text = path.read_text(encoding="utf-8")
+        lines = [re.sub(r"[\[\](),;]", " ", line.partition("#")[0]).split() for line in text.splitlines()]
         lengths = tuple({len(line) for line in lines if line})
         try:
             numbers = np.array([decimal(word) for line in lines for word in line])
@@ -121,11 +122,6 @@ def read_pose(path: Path) -> np.ndarray:
     return T_target_source
 
 
-def _text_of(path: Path) -> str:
-    with refusing(path, "is no text ({})", POSES):
-        return path.read_text(encoding="utf-8")
-
-
 @dataclass(frozen=True)
 class Clouds:
     """The two clouds of a registration, and its ICP."""
@@ -135,7 +131,7 @@ class Clouds:
     frame: CanonicalFrame  # canonical frame of the target
     source: np.ndarray  # (N, 3) in that frame, at its initial pose
     target: np.ndarray  # (P, 3) in that frame
-    icp: BatchedICP  # ICP to that target
+    icp: AnyICP  # ICP to that target
 
     @classmethod
     def prepared(
@@ -151,7 +147,7 @@ class Clouds:
         source_unit: str | None = None,
     ) -> Clouds:
         """Check a user's clouds and bring them into the target's frame; see :meth:`gpca.Explainer.explain`."""
-        from gpca.alignment.batched_icp import BatchedICP
+        from gpca.alignment.batched_icp import icp_to
 
         source, target = as_points(source_points, "source", notes), as_points(target_points, "target", notes)
         T_init = np.eye(4) if T_target_source_init is None else np.array(T_target_source_init, np.float64)
@@ -168,8 +164,7 @@ class Clouds:
         if T_target_source_init is not None and distance > FARTHEST_START:
             fault = f"puts the source {distance:.3g} diameters of the target away from it"
             raise InputError("initial pose", fault, f"give T_target_source, with its translation in {unit}")
-        normals = None if settings.method == "point_to_point" else normals_towards_camera(target)
-        return cls(seen, T_init, frame, source, target, BatchedICP(target, settings, normals))
+        return cls(seen, T_init, frame, source, target, icp_to(target, settings))
 
 
 def _thinned(points: np.ndarray, cloud_points: int, role: str, notes: list[str]) -> np.ndarray:
@@ -187,7 +182,6 @@ def measure(source: np.ndarray, target: np.ndarray) -> dict[str, float]:
 
 
 def relative_size(source: np.ndarray, target: np.ndarray) -> float:
-    """Return the ratio of the radii of gyration of two clouds (N, 3) and (M, 3)."""
     radii = [np.sqrt(cloud.var(axis=0).sum()) for cloud in (source, target)]
     return float(radii[0] / radii[1])
 
@@ -262,7 +256,6 @@ class Void(NamedTuple):
 
 
 def voids_of(source: np.ndarray, target: np.ndarray, fitness: float, familiar: Familiarity) -> list[Void]:
-    """Return the faults that leave an explanation without meaning, if any."""
     voids = []
     if (matches := round(fitness * len(source))) < FEWEST_MATCHES:
         ended = f"only {matches} of the source's points" if matches else "no source point"

@@ -296,20 +296,17 @@ def learn(
 
 def judged_unseen(training: TrainingSet, gpc: GPCSettings, *axes: object) -> tuple[Judgment, np.ndarray]:
     """Judge registrations by classifiers of other families: start and causes, and results (T, N) at `TOLERANCES`."""
-    count = len(training.label_N)
-    shapes = {"failure_N": (), "causes_N_3": (3,), "causes_variances_N_3": (3,), "bald_N": ()}
-    parts = {name: np.full((count, *shape), np.nan) for name, shape in shapes.items()}
-    result_T_N = np.full((len(TOLERANCES), count), np.nan)
+    parts, rows = [], []
+    result_T_N = np.full((len(TOLERANCES), len(training)), np.nan)
     for fold, (seen, unseen) in enumerate(training.folds()):
         learned, asked = training.subset(seen), training.subset(unseen)
         clear = learned.subset(learned.label_N != BORDERLINE)
         classifier = clear.classifier(gpc, *axes, "calibration", fold)
-        judged = classifier.judge(classifier.normalized(asked.features_N_F))
-        for name, part in parts.items():
-            part[unseen] = getattr(judged, name)
+        parts.append(classifier.judge(classifier.normalized(asked.features_N_F)))
+        rows.append(unseen)
         judge = learned.judge()
         result_T_N[:, unseen] = [asked.probabilities(judge, tolerance) for tolerance in TOLERANCES]
-    return Judgment(**parts), result_T_N
+    return Judgment.joined(parts).subset(np.argsort(np.concatenate(rows))), result_T_N
 
 
 def calibrated(

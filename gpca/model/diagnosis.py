@@ -170,7 +170,6 @@ class FittingPose:
 
 
 def in_unit_of(frame: CanonicalFrame, values: Any, *names: str) -> dict[str, Any]:
-    """Return these lengths, in diameters, in the user's unit."""
     return {name: getattr(values, name) * frame.diameter for name in names}
 
 

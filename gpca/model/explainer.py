@@ -14,7 +14,7 @@ import numpy as np
 from gpca.alignment.icp import clipped_cost
 from gpca.alignment.methods.interface import Outcome, Pair
 from gpca.alignment.methods.registry import make_method, method_entry
-from gpca.causes.policy import NOTHING, QUEUE, Decision, RecoveryPolicy
+from gpca.causes.policy import NOTHING, QUEUE, Decision
 from gpca.causes.truth import NOMINAL
 from gpca.classifier.scores import entropy
 from gpca.errors import InputError
@@ -31,7 +31,6 @@ from gpca.model.tolerance import DEFAULT as DEFAULT_TOLERANCE
 from gpca.model.tolerance import Tolerance
 from gpca.objects.canonical import CanonicalFrame, thin
 from gpca.objects.surface import as_points
-from gpca.reenactment.enactment import Enactment
 from gpca.rigid import inverse, transform
 from gpca.seeds import generator, seed_of
 from gpca.uncertainty.estimators.interface import RegisteredPair
@@ -45,13 +44,10 @@ INVERSE_COST = 0.5  # an inverse initial pose that ends with a smaller share of 
 
 
 class Explainer:
-    """Explains registrations with a model and its policy, by default those found; without a `device`, without torch."""
+    """Explains registrations with a model, by default the one found; without a `device` of torch, without torch."""
 
-    def __init__(
-        self, model: Model | None = None, policy: RecoveryPolicy | None = None, device: str | None = None
-    ) -> None:
+    def __init__(self, model: Model | None = None, device: str | None = None) -> None:
         self.model = Model.load(model_path()) if model is None else model
-        self.policy = self.model.policy if policy is None else policy
         self._device = device
 
     @classmethod
@@ -67,7 +63,6 @@ class Explainer:
         unit: str = "m",
         frame: CanonicalFrame | None = None,
         uncertainty: UncertaintySettings | None = None,
-        diagnose: bool = True,
         method: str | None = None,
         estimator: str = MONTE_CARLO,
         fast: bool = False,
@@ -82,7 +77,6 @@ class Explainer:
             source_points, target_points: (N, 3) arrays or Open3D clouds, in the `unit` of poses and results, too.
             frame: canonical frame of the target; by default, computed from its points.
             uncertainty: spread of the starts for the uncertainty of the pose; None skips it.
-            diagnose: whether to diagnose the registration; else GP-CA alone determines the action.
             method, estimator: of docs/registration.md; by default, the model's own ICP, and Monte-Carlo.
             tolerance: how far the pose may be off: a length, an angle or a share of the diameter, such as ``5mm``.
             register: whether to register; otherwise the initial pose itself is explained, as :meth:`judge` does.
@@ -94,28 +88,25 @@ class Explainer:
         clouds, limit, outcome = self._registered(inputs, source_unit, tolerance, method, register, notes, seconds)
         T_found, started = outcome.T_target_source, register and T_target_source_init is not None
         voids = voids_of(clouds.source, clouds.target, outcome.fitness, self.model.familiar)
-        diagnosis = None
-        enactments: list[Enactment] = []
-        if diagnose:
-            diagnoser = (self.model.diagnoser.quick() if fast else self.model.diagnoser).by_method(method)
-            with _timed(seconds, "diagnosis"):
-                aligned = clouds.source, clouds.target, T_found
-                diagnosis, enactments = diagnoser.diagnose(*aligned, register, limit / clouds.frame.diameter)
-            diagnosis = replace(diagnosis.outside(clouds.frame, clouds.T_target_source_init), void=bool(voids))
-            notes += [FAST] if fast else []
+        diagnoser = (self.model.diagnoser.quick() if fast else self.model.diagnoser).by_method(method)
+        with _timed(seconds, "diagnosis"):
+            aligned = clouds.source, clouds.target, T_found
+            diagnosis, enactments = diagnoser.diagnose(*aligned, register, limit / clouds.frame.diameter)
+        diagnosis = replace(diagnosis.outside(clouds.frame, clouds.T_target_source_init), void=bool(voids))
+        notes += [FAST] if fast else []
         with _timed(seconds, "embedding"):
             h_1_d = self.embed(transform(T_found, clouds.source))
         with _timed(seconds, "attribution"):
             (scores_C,), (variances_C,), (bald,) = self.model.gpc.attribute(h_1_d)
-        numbers = [*scores_C, *((diagnosis.result, diagnosis.start, *diagnosis.causes.values()) if diagnosis else ())]
+        numbers = [*scores_C, diagnosis.result, diagnosis.start, *diagnosis.causes.values()]
         if not np.isfinite(h_1_d).all() or not np.isfinite(numbers).all():
             raise InputError("model", "gives non-finite numbers for these clouds", "use another one")
         with _timed(seconds, "familiarity"):
             unusual, unusual_to_gpca = self.model.familiar.warnings(clouds.source, clouds.target)
             warnings = [*map(str, voids), *unusual]
-            if voids and diagnosis is not None and (scale := diagnosis.reenacted.scale) and scale.off:
+            if voids and (scale := diagnosis.reenacted.scale) and scale.off:
                 warnings.append(scale.words)
-            if diagnosis is not None and diagnosis.unlikeness > 1:
+            if diagnosis.unlikeness > 1:
                 warnings.append(
                     f"the pair is {diagnosis.unlikeness:.1f} times as far from the registrations that the diagnosis "
                     "was trained on as 99 % of these are from one another"
@@ -132,13 +123,10 @@ class Explainer:
             with _timed(seconds, "repair"):
                 by, found = method if register else GIVEN, () if fast else enactments
                 repaired = Repair.of(self.model, clouds, outcome, by, limit, unit, found)
-        rescale = diagnosis is not None and diagnosis.wrong_scale
-        if repaired is not None and repaired.verdict == REPAIRED and not rescale:
+        if repaired is not None and repaired.verdict == REPAIRED and not diagnosis.wrong_scale:
             decision = Decision(TAKE, "", repaired.reason)
         elif voids:
             decision = Decision(CHECK, "", ", ".join(void.check for void in voids))
-        elif diagnosis is None:
-            decision = self.policy.decide(scores_C, float(bald), concepts=self.model.gpc.classes)
         elif diagnosis.state == NOMINAL:
             decision = Decision(NOTHING, "", diagnosis.remark)
         else:
@@ -168,8 +156,9 @@ class Explainer:
             scene=Scene(
                 *(clouds.source, clouds.target, T_found, clouds.frame),
                 *(self.model.icp.correspondence_distance, limit / clouds.frame.diameter),
-                *((enactments, self.model.diagnoser.truth) if enactments else ()),
-            ).beside(repaired.scene if repaired else None),
+                *(enactments, self.model.diagnoser.truth),
+                T_repaired=repaired.scene.T_repaired if repaired and repaired.scene else None,
+            ),
         )
 
     def repair(
@@ -206,7 +195,7 @@ class Explainer:
 
         labeled = LabeledRegistrations.of([explanation.diagnosis for explanation in explanations], labels, groups)
         model = replace(self.model, diagnoser=labeled.set_in(self.model.diagnoser))
-        return Explainer(model, self.policy, self._device)
+        return Explainer(model, self._device)
 
     def explain_many(
         self,
@@ -238,12 +227,12 @@ class Explainer:
         return h_D_d.mean(axis=0, keepdims=True)
 
     def _decided(self, diagnosis: Diagnosis, registered: bool) -> Decision:
-        """Decide what to do about a wrong result: a better pose comes before the policy, unless that learns from it."""
+        """Decide about a wrong result: a better pose comes before the policy, unless a bad start is to be queued."""
         if (scale := diagnosis.reenacted.scale) and diagnosis.wrong_scale:
             return Decision(RESCALE, "", scale.advice)
         causes, bad_start = diagnosis.causes, diagnosis.start >= diagnosis.start_threshold
-        decision = self.policy.decide(np.array([*causes.values()]), diagnosis.bald, concepts=(*causes,))
-        if self.policy is not self.model.policy or (bad_start and decision.action == QUEUE):
+        decision = self.model.policy.decide(np.array([*causes.values()]), diagnosis.bald, concepts=(*causes,))
+        if bad_start and decision.action == QUEUE:
             return decision
         if better := diagnosis.reenacted.better:
             return Decision(RERUN, "", f"it fits with probability {better.probability:.2f}; --save-pose writes it")
@@ -267,12 +256,11 @@ class Explainer:
             allowed = tolerance if isinstance(tolerance, Tolerance) else Tolerance.parse(tolerance)
             limit = allowed.length(clouds.target, clouds.frame.diameter, inputs[3])
         with _timed(seconds, "icp"):
-            return clouds, limit, self._aligned(clouds, method, notes) if register else _as_given(clouds)
+            return clouds, limit, self._aligned(clouds, method, register, notes)
 
-    def _aligned(self, clouds: Clouds, method: str | None, notes: list[str]) -> Outcome:
-        """Register by the model's own ICP or by the given method; a failure adds a note."""
-        if method is None:
-            [T], [fitness], [rmse] = clouds.icp.register(clouds.source, np.eye(4)[None])
+    def _aligned(self, clouds: Clouds, method: str | None, register: bool, notes: list[str]) -> Outcome:
+        if method is None or not register:  # without a registration, the initial pose is measured
+            [T], [fitness], [rmse] = clouds.icp.register(clouds.source, np.eye(4)[None], None if register else 0)
             return Outcome(T, float(fitness), float(rmse))
         pair = Pair(clouds.source, clouds.target, seed=seed_of("explanation", method))
         outcome = make_method(method)(pair if method_entry(method).points_only else pair.with_normals())
@@ -288,7 +276,6 @@ class Explainer:
         settings: UncertaintySettings,
         notes: list[str],
     ) -> PoseSpread | None:
-        """Estimate the uncertainty of the pose; a failure adds a note."""
         source, diameter = thin(clouds.source, settings.icp_points, "spread"), clouds.frame.diameter
         starts = settings.starts if estimator == MONTE_CARLO else None
         if method is None and starts:
@@ -325,12 +312,6 @@ def judge(
 def repair(source_points: np.ndarray, target_points: np.ndarray, *options: Any, **named: Any) -> Repair:
     """Put a registration right by the default model, see :meth:`Explainer.repair`; for many pairs, load one once."""
     return Explainer.load().repair(source_points, target_points, *options, **named)
-
-
-def _as_given(clouds: Clouds) -> Outcome:
-    """Measure the initial pose without moving it."""
-    [T], [fitness], [rmse] = clouds.icp.register(clouds.source, np.eye(4)[None], max_iterations=0)
-    return Outcome(T, float(fitness), float(rmse))
 
 
 @contextmanager

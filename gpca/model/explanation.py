@@ -141,7 +141,6 @@ class ExplainedRegistration:
         write_text(path, self.html(names))
 
     def _repr_html_(self) -> str:
-        """Return the page for a notebook."""
         return page.framed(self.html())
 
     def pose_rows(self, T_target_source: np.ndarray) -> list[str]:
@@ -168,7 +167,7 @@ class ExplainedRegistration:
 class Explanation(ExplainedRegistration):
     """One registration of an object, explained by a trained model."""
 
-    diagnosis: Diagnosis | None  # state and causes, learned from measured causes; None if not requested
+    diagnosis: Diagnosis  # state and causes, learned from measured causes
     repaired: ExplainedRegistration | None = None  # a :class:`gpca.model.repaired.Repair`, if requested
     scores: dict[str, float]
     variances: dict[str, float]
@@ -179,8 +178,8 @@ class Explanation(ExplainedRegistration):
 
     @property
     def reenacted_poses(self) -> Sequence[FittingPose]:
-        """Hypotheses of the true pose, most probable first; none without a diagnosis."""
-        return () if self.diagnosis is None or self.unknown else self.diagnosis.reenacted.poses
+        """Hypotheses of the true pose, most probable first; none where they mean nothing."""
+        return () if self.unknown else self.diagnosis.reenacted.poses
 
     @property
     def fitting_pose(self) -> np.ndarray:
@@ -200,8 +199,8 @@ class Explanation(ExplainedRegistration):
 
     def as_dict(self) -> dict[str, object]:
         """Values for JSON."""
-        parts = {"diagnosis": self.diagnosis, "repaired": self.repaired}
-        return super().as_dict() | {name: part and part.as_dict() for name, part in parts.items()}
+        parts = {"diagnosis": self.diagnosis.as_dict(), "repaired": self.repaired and self.repaired.as_dict()}
+        return super().as_dict() | parts
 
     def html(self, names: Mapping[str, str] | None = None) -> str:
         """Return a page that needs no other file: both clouds in 3-D, causes, poses, counterfactuals."""
@@ -210,7 +209,7 @@ class Explanation(ExplainedRegistration):
         body += [page.listed("Repair", self.repaired.lines())] if self.repaired else []
         if scene and self.unknown:
             scene = replace(scene, enactments=())  # hypotheses mean nothing where scores mean nothing
-        elif self.diagnosis and not self.unknown:
+        elif not self.unknown:
             body += [page.promise(self.diagnosis.guarantee), page.causes(self.diagnosis, self.unit)]
             if scene:
                 body.append(page.poses(self.diagnosis.reenacted, "the object", self.unit, observation=True))
@@ -230,7 +229,7 @@ class Explanation(ExplainedRegistration):
         if self.unknown:
             return [f"state     {UNKNOWN}", *action]
         return [
-            *(self.diagnosis.lines(self.unit) if self.diagnosis else []),
+            *self.diagnosis.lines(self.unit),
             *action,
             "",
             PAPER,

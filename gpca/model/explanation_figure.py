@@ -39,10 +39,7 @@ def draw_explanation(explanation: Explanation, png_path: str | Path, names: str 
     _draw_views(above, explanation, scene, views, view, corners_2_2)
     left, middle, right = below.subplots(1, 3, width_ratios=(1, 1, 1.3))
     _draw_causes(left, explanation)
-    if scene.possibilities:
-        _draw_what_ifs(middle, scene, explanation.unit)
-    else:
-        middle.set_axis_off()
+    _draw_what_ifs(middle, scene, explanation.unit)
     wrapped = [part for line in _lines(explanation) for part in wrap(line, LETTERS, subsequent_indent="   ")]
     text = "\n".join(wrapped[:MOST_LINES] + ["…"] * (len(wrapped) > MOST_LINES))
     look = {"va": "top", "ha": "left", "fontsize": style.SMALL_PT, "linespacing": 1.4, "in_layout": False}
@@ -53,11 +50,10 @@ def draw_explanation(explanation: Explanation, png_path: str | Path, names: str 
 
 
 def _views(explanation: Explanation, scene: Scene) -> list[tuple[str, np.ndarray]]:
-    """Return the source before and after the registration, and in the repaired or another likely pose, with titles."""
     views = [("before", scene.source), ("after", scene.aligned)]
     if scene.T_repaired is not None:
         return [*views, ("repaired", transform(scene.T_repaired, scene.source))]
-    if explanation.diagnosis and not explanation.unknown:
+    if not explanation.unknown:
         poses = zip(explanation.diagnosis.reenacted.poses, scene.possibilities, strict=True)
         for other in [possibility for pose, possibility in poses if not pose.registered][:1]:  # the most probable
             views.append((f"another pose (probability {other.probability:.2f})", transform(other.T, scene.source)))
@@ -72,7 +68,6 @@ def _draw_views(
     view: np.ndarray,
     corners_2_2: np.ndarray,
 ) -> None:
-    """Draw the source over the target in each view at one scale, colored by its distance to the target."""
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
     from scipy.spatial import cKDTree
@@ -97,10 +92,7 @@ def _draw_views(
 
 
 def _draw_causes(panel, explanation: Explanation) -> None:
-    """Draw the probability of each cause; without a diagnosis, the scores of GP-CA stand for them."""
-    diagnosis = explanation.diagnosis
-    shares = diagnosis.causes if diagnosis else explanation.scores
-    variances = diagnosis.variances if diagnosis else explanation.variances
+    shares, variances = explanation.diagnosis.causes, explanation.diagnosis.variances
     share_C, deviation_C = np.array([*shares.values()]), np.sqrt([variances[name] for name in shares])
     spread_2_C = np.stack([np.minimum(deviation_C, share_C), np.minimum(deviation_C, 1 - share_C)])
     colors = [style.CONCEPT_COLORS.get(name, style.LIGHT_GRAY) for name in shares]
@@ -111,7 +103,6 @@ def _draw_causes(panel, explanation: Explanation) -> None:
 
 
 def _draw_what_ifs(panel, scene: Scene, unit: str) -> None:
-    """Draw the re-enacted errors with all causes, without each and without any, and the limit of a failure."""
     errors = [scene.frame.diameter * scene.possibilities[0].errors[subset] for subset in ROWS]
     panel.barh(np.arange(len(errors)), errors, color=style.BLUE, height=0.6)
     panel.axvline(scene.limit * scene.frame.diameter, color=style.VERMILION, linewidth=0.8)
@@ -124,8 +115,6 @@ def _lines(explanation: Explanation) -> list[str]:
     diagnosis = explanation.diagnosis
     if explanation.unknown:
         lines = ["state: unknown"]
-    elif diagnosis is None:
-        lines = [f"leading concept: {explanation.concept}"]
     else:
         lines = [f"{diagnosis.state}: {diagnosis.statement}"]
         tolerance = f"{in_decimals(diagnosis.tolerance)} {explanation.unit}"

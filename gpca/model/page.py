@@ -21,7 +21,6 @@ TONES = {"nominal": "good", "failed": "bad", UNKNOWN: "doubt"}
 
 
 def assembled(title: str, head: str, body: Sequence[str], scene: Scene | None, unit: str) -> str:
-    """Return the page of these sections, with a 3-D view if there is a scene."""
     text = {path.name: path.read_text(encoding="utf-8") for path in ASSETS.iterdir()}
     view = script = ""
     if scene is not None:
@@ -44,9 +43,7 @@ def framed(html: str) -> str:
 
 
 def headline(explained: Mapping) -> str:
-    """State the result in one line."""
-    if (diagnosis := explained["diagnosis"]) is None:
-        return f"<h1>The leading concept is {escape(explained['concept'])}</h1>"
+    diagnosis = explained["diagnosis"]
     state = diagnosis["state"]
     probably = "probably " * diagnosis["doubtful"]
     title = {
@@ -124,7 +121,6 @@ def causes(diagnosis: Diagnosis, unit: str) -> str:
 
 
 def poses(reenacted: Reenacted, subject: str, unit: str, *, observation: bool = False) -> str:
-    """List the hypotheses of the true pose, each with a button that shows it."""
     items = "".join(
         f'<li><button type="button" data-view="pose:{k}">Pose {k + 1}</button> <span>{sentence(words)}</span>'
         f'<span class="share"><span class="bar"><i style="width:{100 * pose.probability:.1f}%"></i></span>'
@@ -142,7 +138,6 @@ def poses(reenacted: Reenacted, subject: str, unit: str, *, observation: bool = 
 def counterfactuals(
     scene: Scene, unit: str, without: Mapping[str, str] = WITHOUT, bars: str = "mean errors over starts around it"
 ) -> str:
-    """Draw the eight re-enacted registrations under each hypothesis, each as a button that shows its cloud."""
     if not scene.possibilities:
         return ""
     errors = [[scene.frame.diameter * error for error in pose.errors] for pose in scene.possibilities]
@@ -195,7 +190,6 @@ def section(title: str, body: str) -> str:
 
 
 def bar(name: str, share: float, variance: float, note: str) -> str:
-    """Draw a probability as a bar with a whisker of one standard deviation."""
     spread = sqrt(variance)
     low, high = max(0.0, share - spread), min(1.0, share + spread)
     return (
@@ -210,5 +204,4 @@ def length(value: float, unit: str) -> str:
 
 
 def sentence(text: str) -> str:
-    """Escape text and capitalize its first letter."""
     return escape(text[:1].upper() + text[1:])

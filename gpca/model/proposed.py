@@ -97,7 +97,6 @@ def propose_for(
 def proposed_for_all(
     causes: Causes, reenactments: Reenactments, errors: Errors, icp: ICPSettings, moved: Moved
 ) -> Proposed:
-    """Return the proposals for every registration, by the hypotheses of its re-enactment."""
     proposals, error_N = [], []
     for row, hypotheses in enumerate(zip(reenactments.T_model_observed, reenactments.weight, strict=True)):
         pair = observed_pair(causes, row)

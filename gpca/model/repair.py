@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gpca.alignment.batched_icp import BatchedICP
+from gpca.alignment.batched_icp import BatchedICP, icp_to
 from gpca.alignment.icp import ICPSettings, clipped_cost
 from gpca.alignment.methods.interface import Pair
 from gpca.alignment.methods.registry import make_method
@@ -38,7 +38,7 @@ OF_ESTIMATE = 0.5  # probability of the estimate of the true pose beside the hyp
 SWEPT, SWEPT_MODEL, CONTINUED = 64, 128, 6  # points that ICP sees from many starts; ends from which it sees all
 
 Refine = Callable[[np.ndarray, np.ndarray], np.ndarray]  # observed points (N, 3), poses (k, 4, 4) -> where they end
-Measure = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]  # poses (n, 4, 4) -> fitness (n,), inlier RMSE (n,)
+Measure = Callable[[np.ndarray], tuple[np.ndarray, ...]]  # poses (n, 4, 4) -> fitness (n,), inlier RMSE (n,)
 
 
 @dataclass(frozen=True)
@@ -49,12 +49,6 @@ class Proposals:
     weight_n: np.ndarray  # (n,) probabilities of the hypotheses that end there, 0 for the registered pose
     evidence: Evidence  # of the n poses, as :class:`TruePoses` has it
     true_poses: TruePoses | None = None  # None where it was read from a file
-
-    def set_of(self, rows: list[int]) -> Evidence:
-        """Return the evidence of the claim that one of these poses is right, which fits as the first of them does."""
-        whole, first = self.evidence, rows[:1]
-        distance_1_K = whole.distance_N_K[rows].min(axis=0, keepdims=True)
-        return Evidence(distance_1_K, whole.weight_N_K[first], whole.inlier_rmse_N[first], whole.fitness_N[first])
 
 
 @dataclass(frozen=True)
@@ -127,7 +121,6 @@ def best_end(observed: np.ndarray, surface: ModelSurface) -> np.ndarray:
 
 
 def unrefined(observed: np.ndarray, T_k: np.ndarray) -> np.ndarray:
-    """Leave poses as the search found them, which the likelihood of all these points has refined already."""
     return T_k
 
 
@@ -156,10 +149,9 @@ def by_method(model: np.ndarray, surface: ModelSurface, name: str, seed: int) ->
 
 
 def measured(observed: np.ndarray, model: np.ndarray, icp: ICPSettings, moved: Moved) -> Measure:
-    """Return what measures poses of an observed cloud by the partners of the cloud that ICP moves."""
     if moved == MODEL:
-        return lambda T_n: BatchedICP(observed, icp).register(model, inverses(T_n), max_iterations=0)[1:]
-    return lambda T_n: BatchedICP(model, icp).register(observed, T_n, max_iterations=0)[1:]
+        return lambda T_n: icp_to(observed, icp).register(model, inverses(T_n), max_iterations=0)[1:]
+    return lambda T_n: icp_to(model, icp).register(observed, T_n, max_iterations=0)[1:]
 
 
 def search(pair: ObservedPair, settings: ReenactmentSettings, surface: ModelSurface) -> tuple[np.ndarray, np.ndarray]:
@@ -183,7 +175,10 @@ def decide(
     """
 
     def of_set(rows: list[int]) -> float:
-        return float(judge.probability(proposals.set_of(rows), tolerance)[0])
+        """Return how probably all of these poses, which fit as the first of them does, are off."""
+        distance_1_K = proposals.evidence.distance_N_K[rows].min(axis=0, keepdims=True)
+        evidence = replace(proposals.evidence.subset(np.array(rows[:1])), distance_N_K=distance_1_K)
+        return float(judge.probability(evidence, tolerance)[0])
 
     probability_n = judge.probability(proposals.evidence, tolerance)
     if described_F is not None:

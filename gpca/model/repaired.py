@@ -13,30 +13,12 @@ from gpca.alignment.methods.registry import method_entry
 from gpca.causes.policy import NOTHING
 from gpca.causes.settings import OBSERVED
 from gpca.guarantee.acceptance import WRONG
-from gpca.model import page
+from gpca.model import page, repair
 from gpca.model.clouds import FEWEST_MATCHES, Clouds, voids_of
 from gpca.model.diagnosis import CHECK, TAKE, UNKNOWN, FittingPose
 from gpca.model.explanation import GIVEN, UNKNOWN_STATUS, ExplainedRegistration, PoseSpread
 from gpca.model.file import Model
-from gpca.model.repair import (
-    GOOD,
-    NOT_REPAIRED,
-    REPAIRED,
-    SEVERAL,
-    Part,
-    Proposals,
-    Refine,
-    Verdict,
-    by_method,
-    by_mixture,
-    decide,
-    difference,
-    measured,
-    propose,
-    search,
-    unrefined,
-    unseen,
-)
+from gpca.model.repair import GOOD, NOT_REPAIRED, REPAIRED, SEVERAL, Part, Proposals, Verdict
 from gpca.model.result import calibrated_at
 from gpca.model.scene import Scene
 from gpca.model.undetermined import Undetermined, undetermined_at
@@ -59,7 +41,6 @@ ALONG = 0.95  # cosine of the angle to an axis within which that axis names a di
 
 
 def side_in_words(direction: Sequence[float]) -> str:
-    """Describe a unit vector (3,) in the target's frame."""
     along = int(np.argmax(np.abs(direction)))
     if abs(direction[along]) >= ALONG:
         return f"the target's {'+' if direction[along] > 0 else '-'}{'xyz'[along]} side"
@@ -149,30 +130,30 @@ class Repair(ExplainedRegistration):
             return unrepaired
         pair = diagnoser.pair(clouds.source, clouds.target, T, method != GIVEN)
         surface, before = ModelSurface(pair.model), transform(pair.T_init, pair.observed)
-        refine: Refine = unrefined
+        refine: repair.Refine = repair.unrefined
         drawn = len(pair.observed) / len(clouds.source), len(pair.model) / len(clouds.target)
         if min(drawn) < 1:
-            refine = by_mixture(clouds.target, surface.spacing * drawn[1] ** 0.5)
+            refine = repair.by_mixture(clouds.target, surface.spacing * drawn[1] ** 0.5)
         if method not in (None, GIVEN) and not method_entry(method).is_global:
-            refine = by_method(clouds.target, surface, method, seed_of("repair", method))
-        measure = measured(before, pair.model, diagnoser.runs.icp, OBSERVED)
+            refine = repair.by_method(clouds.target, surface, method, seed_of("repair", method))
+        measure = repair.measured(before, pair.model, diagnoser.runs.icp, OBSERVED)
         if lost:
             hypotheses = pose_posterior(Pair(before, pair.model), diagnoser.reenactment, prior=False)
         elif enactments:
             found = [enactment.hypothesis for enactment in enactments]
             hypotheses = np.array([hypothesis.T for hypothesis in found]), weights_of(found)
         else:
-            hypotheses = search(pair, diagnoser.reenactment, surface)
-        proposals = propose(clouds.source, surface, T, *hypotheses, refine, measure)
+            hypotheses = repair.search(pair, diagnoser.reenactment, surface)
+        proposals = repair.propose(clouds.source, surface, T, *hypotheses, refine, measure)
         proposals.evidence.fitness_N[0], proposals.evidence.inlier_rmse_N[0] = pair.fitness_n[0], pair.inlier_rmse_n[0]
         level = calibrated_at(diagnoser.levels, tolerance)
         described_F = None if method == GIVEN else described(pair, diagnoser.runs.icp)
-        verdict = decide(diagnoser.judge, level, proposals, tolerance, lost, described_F)
+        verdict = repair.decide(diagnoser.judge, level, proposals, tolerance, lost, described_F)
         errors_n = diagnoser.judge.error(proposals.evidence)
         poses = [pose.outside(frame, T_init) for pose in other_poses(proposals, verdict, errors_n, surface)]
         T_best = proposals.T_n[verdict.row or 1]
         if verdict.name != GOOD:
-            outliers, missing = unseen(clouds.source, surface, T_best)
+            outliers, missing = repair.unseen(clouds.source, surface, T_best)
             free = undetermined_at(transform(T_best, before), surface)
             spread = PoseSpread(free.covariance, frame.diameter, SURFACE, None)
             parts: dict[str, Any] = {"free": free.outside(frame), "spread": spread}
@@ -228,9 +209,16 @@ class Repair(ExplainedRegistration):
         limit = f"{in_decimals(self.tolerance)} {self.unit} ({100 * self.tolerance_share:.2g} % of the diameter)"
         lines.append(f"result    probability {self.result:.2f} that the pose is off by more than {limit}{before}")
         if self.verdict == REPAIRED:
-            lines.append(f"promise   {self._promise}")
+            promise = "none: the model was not calibrated on such repairs"
+            if self.wrong is not None:
+                promise = f"at most {self.wrong:.0%} of the poses that are called repaired are wrong"
+            lines.append(f"promise   {promise}")
         if self.outliers is not None:
-            lines.append(f"seen      {self._seen}")
+            seen = f"{self.outliers:.0%} of the source are outliers"
+            if self.missing is not None:
+                side = side_in_words(self.missing.direction)
+                seen += f"; {self.missing.share:.0%} of the target were not seen, on {side}"
+            lines.append(f"seen      {seen}")
         if self.spread is not None:
             rotation, shift = in_decimals(self.spread.rotation_deg), in_decimals(self.spread.translation)
             lines.append(f"spread    {rotation}° and {shift} {self.unit}, root mean square")
@@ -254,34 +242,18 @@ class Repair(ExplainedRegistration):
         body = [page.listed("Repair", self.lines()), details]
         return page.assembled("Registration repaired", head, body, self.scene, self.unit)
 
-    @property
-    def _promise(self) -> str:
-        if self.wrong is None:
-            return "none: the model was not calibrated on such repairs"
-        return f"at most {self.wrong:.0%} of the poses that are called repaired are wrong"
-
-    @property
-    def _seen(self) -> str:
-        outliers = f"{self.outliers:.0%} of the source are outliers"
-        if self.missing is None:
-            return outliers
-        side = side_in_words(self.missing.direction)
-        return f"{outliers}; {self.missing.share:.0%} of the target were not seen, on {side}"
-
 
 def other_poses(proposals: Proposals, verdict: Verdict, error_n: np.ndarray, surface: ModelSurface) -> list[OtherPose]:
-    """Describe the proposals for the place of the registered pose, in diameters."""
     poses, first = [], verdict.rows[0] if verdict.rows else 1
     for row in range(1, len(proposals.T_n)):
         T, off = proposals.T_n[row], float(verdict.probability_n[row])
-        differs, by = (None, 0.0) if row == first else difference(surface, proposals.T_n[first], T)
+        differs, by = (None, 0.0) if row == first else repair.difference(surface, proposals.T_n[first], T)
         numbers = float(proposals.weight_n[row]), float(error_n[row])
         poses.append(OtherPose.of(T, *numbers, proposals.T_n[0], surface, off=off, differs=differs, differs_by=by))
     return poses
 
 
 def reason_of(verdict: Verdict, poses: Sequence[OtherPose], unit: str) -> str:
-    """Say why this is the verdict."""
     if verdict.name == GOOD:
         return "the registered pose is not called failed, so it stays"
     if verdict.name == SEVERAL:

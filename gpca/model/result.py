@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from operator import attrgetter
 
 import numpy as np
 from scipy.special import expit, logit
@@ -154,8 +155,9 @@ UNCALIBRATED = (Calibrated(DEFAULT_TOLERANCE, EVEN),)
 
 def calibrated_at(levels: Sequence[Calibrated], tolerance: float) -> Calibrated:
     """Return what holds at a tolerance: between two levels the more cautious of both, beyond them no guarantee."""
-    lower = max((level for level in levels if level.tolerance <= tolerance * ROUNDED), default=None, key=_tolerance)
-    upper = min((level for level in levels if level.tolerance >= tolerance / ROUNDED), default=None, key=_tolerance)
+    by = attrgetter("tolerance")
+    lower = max((level for level in levels if level.tolerance <= tolerance * ROUNDED), default=None, key=by)
+    upper = min((level for level in levels if level.tolerance >= tolerance / ROUNDED), default=None, key=by)
     if lower is None or upper is None:
         nearest = lower or upper
         assert nearest is not None
@@ -165,7 +167,3 @@ def calibrated_at(levels: Sequence[Calibrated], tolerance: float) -> Calibrated:
     bounds = [level.repaired_below for level in (lower, upper) if level.repaired_below is not None]
     below = min(bounds) if len(bounds) == 2 else None
     return Calibrated(tolerance, max(lower.threshold, upper.threshold), cautious, below)
-
-
-def _tolerance(level: Calibrated) -> float:
-    return level.tolerance

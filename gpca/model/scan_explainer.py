@@ -161,7 +161,6 @@ def registered_scans(
 
 
 def _reenacted(scans: Scans, enactments: Sequence[Enactment], T_found: np.ndarray) -> Reenacted:
-    """Summarize re-enactments; one pose is the result."""
     weight_k = weights_of(enactment.hypothesis for enactment in enactments)
     reenacted = Reenacted.of(enactments, weight_k, T_found, scans.coarse)
     poses = (replace(pose, registered=pose.T_target_source is T_found) for pose in reenacted.poses)
@@ -171,7 +170,6 @@ def _reenacted(scans: Scans, enactments: Sequence[Enactment], T_found: np.ndarra
 def _prepared(
     clouds: dict[str, np.ndarray], T_init: np.ndarray, unit: str, voxel: float | None, notes: list[str]
 ) -> tuple[Scans, CanonicalFrame]:
-    """Thin both scans to voxels; return them with the frame of the target."""
     meters_per(unit)
     for name, points in clouds.items():
         require_cloud_points(points, name)
@@ -218,7 +216,6 @@ def evidence_at(
 
 
 def failure_of(evidence: Evidence) -> float:
-    """Return the probability of an error above the limit."""
     if not evidence.overlap > 0:
         return 1.0
     log_apart = np.log(max(evidence.apart, LEAST))
@@ -233,13 +230,11 @@ def state_of(failure: float, overlap: float) -> str:
 
 
 def causes_of(reenacted: Reenacted, limit: float) -> tuple[str, ...]:
-    """Return the causes that add a third of the limit to the error, the largest first."""
     ranked = sorted(reenacted.effects, key=lambda name: -reenacted.effects[name])
     return tuple(name for name in ranked if reenacted.effects[name] >= ADDS * limit)
 
 
 def decision(state: str, reenacted: Reenacted, overlap: float, causes: Sequence[str]) -> tuple[str, str]:
-    """Return what to do next, and why."""
     if state == NOMINAL:
         return NOTHING, "the scans lie close to each other, and no other pose fits as well"
     if overlap == 0:

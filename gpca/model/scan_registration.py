@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gpca.alignment.batched_icp import BatchedICP, BatchedPlaneICP
+from gpca.alignment.batched_icp import AnyICP, BatchedICP, BatchedPlaneICP
 from gpca.alignment.features import NEIGHBORS, estimate_normals
 from gpca.alignment.icp import ICPSettings, clipped_cost
 from gpca.alignment.methods.interface import Outcome, Pair
@@ -103,7 +103,7 @@ class VoxelICP:
 
     def __init__(self, target: np.ndarray, normals: np.ndarray | None, voxel: float) -> None:
         self._reach = COARSE_TO_FINE[-1] * voxel
-        self._levels: list[BatchedICP | BatchedPlaneICP] = []
+        self._levels: list[AnyICP] = []
         for far in COARSE_TO_FINE:
             if normals is None:
                 self._levels.append(BatchedICP(target, ICPSettings("point_to_point", far * voxel, ITERATIONS)))

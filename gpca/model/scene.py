@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
@@ -51,10 +51,6 @@ class Scene:
     T_repaired: np.ndarray | None = None  # (4, 4) of the pose that takes the place of the result
     T_others: Sequence[np.ndarray] = ()  # poses to be shown where nothing was re-enacted
 
-    def beside(self, other: Scene | None) -> Scene:
-        """Return the scene with the repaired pose of another, if there is one."""
-        return self if other is None else replace(self, T_repaired=other.T_repaired)
-
     @property
     def aligned(self) -> np.ndarray:
         """The registered source (N, 3)."""
@@ -91,7 +87,6 @@ class Scene:
         return pair | {"poses": poses} | self._compared()
 
     def _compared(self) -> dict[str, object]:
-        """The view that is drawn beside others: the repaired pose, or the likeliest pose if it is another one."""
         if self.T_repaired is not None:
             return {"repaired": flat(self.T_repaired), "beside": "repaired"}
         T_poses = [pose.T for pose in self.possibilities] or self.T_others
@@ -130,6 +125,5 @@ def flat(T: np.ndarray) -> list[float]:
 
 
 def taken_out(subset: int, without: Mapping[str, str] = WITHOUT) -> str:
-    """Describe a subset of the causes by the causes that it leaves out."""
     gone = [without[name] for cause, name in enumerate(CONCEPTS) if cause not in SUBSETS[subset]]
     return ", ".join(gone).capitalize() or "As it was"

@@ -46,7 +46,6 @@ def upgraded(content: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _drop_bounds(content: Mapping[str, Any]) -> None:
-    """Remove the bounds that gpytorch keeps beside its parameters, which may be infinite."""
     classifier = content["diagnoser"]["classifier"]
     for gpc in (content["gpc"], classifier["failure"], *classifier["causes"]):
         gpc["kernel"] = {name: part for name, part in gpc["kernel"].items() if not name.endswith("_bound")}
@@ -77,7 +76,6 @@ class _Tensors(pickle.Unpickler):
         return storage
 
     def _array(self, storage: np.ndarray, offset: int, shape: tuple, strides: tuple, *_: object) -> np.ndarray:
-        """Return an array of its own for a tensor, the same for the same tensor."""
         last = offset + sum((size - 1) * stride for size, stride in zip(shape, strides, strict=True))
         if min((offset, *shape, *strides)) < 0 or (0 not in shape and last >= len(storage)):
             raise ValueError("a tensor claims to be larger than its data in the file")

@@ -119,7 +119,6 @@ def lying_on(surface: ModelSurface, points: np.ndarray, noise: float) -> np.ndar
 
 
 def undetermined_at(points: np.ndarray, surface: ModelSurface, open_ends: bool = False) -> Undetermined:
-    """Return what is not determined of a pose that takes observed points (N, 3) to a surface."""
     return Undetermined.of(Holder(surface.points, surface.tree, open_ends).freedom(points))
 
 
@@ -146,7 +145,6 @@ def elementary(twists_k_6: np.ndarray, metric_6_6: np.ndarray) -> list[np.ndarra
 
 
 def axis_in_words(axis: Sequence[float]) -> str:
-    """Describe a unit vector (3,) in the target's frame."""
     along = int(np.argmax(np.abs(axis)))
     if abs(axis[along]) >= np.cos(np.deg2rad(ALONG_DEG)):
         return f"the target's {AXES[along]} axis"
@@ -154,6 +152,5 @@ def axis_in_words(axis: Sequence[float]) -> str:
 
 
 def _upward(axis_3: np.ndarray) -> tuple[float, ...]:
-    """Return a unit vector of which the largest part is positive."""
     unit_3 = axis_3 / np.linalg.norm(axis_3)
     return tuple((unit_3 * np.sign(unit_3[np.abs(unit_3).argmax()])).tolist())

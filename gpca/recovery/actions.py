@@ -174,7 +174,6 @@ def denoise(holding: Holding, robot: Robot, random: np.random.Generator, frames:
 
 
 def best_start(holding: Holding, robot: Robot, poses: Sequence[np.ndarray | None]) -> Holding:
-    """Start from the pose with the best agreement with the shots: one of these, or the current estimate."""
     cloud_m = fuse(holding.shots, robot.diameter_m, holding.filtered)
     if not len(cloud_m):
         return holding

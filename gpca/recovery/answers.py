@@ -11,7 +11,7 @@ import numpy as np
 from gpca.classifier.scores import Attribution
 from gpca.encoders.registry import EncoderSettings
 from gpca.encoders.training import embed, train_encoder
-from gpca.explainers.interface import answer_of
+from gpca.explainers.interface import ConceptExplainer, answer_of
 from gpca.explainers.registry import explainer_entry
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.synthesis import as_registrations
@@ -20,7 +20,6 @@ from gpca.uncertainty.designs import evaluate_design
 from gpca.uncertainty.settings import UncertaintySettings
 
 Explain = Callable[[Registrations], Attribution]
-Attach = Callable[[Registrations], Registrations]
 
 
 class CaseKey(NamedTuple):
@@ -92,21 +91,6 @@ def as_shares(scores_N_C: np.ndarray) -> np.ndarray:
     return scores_N_C if shares else softmax(scores_N_C, axis=1)
 
 
-@dataclass(frozen=True)
-class LoopExplainers:
-    """Explainers by name, and how well each does on the calibration samples."""
-
-    explain: Mapping[str, Explain]  # attribute registrations without labels
-    fitted: Mapping[str, Any]  # the explainers themselves
-    attach: Mapping[str, Attach]  # add to registrations what an explainer reads
-    calibration: Mapping[str, Attribution]  # predictions for the calibration samples
-    concepts: np.ndarray  # (N,) the truth about those
-
-    def right(self, name: str) -> np.ndarray:
-        """Which calibration samples (N,) an explainer attributes rightly."""
-        return self.calibration[name].predicted_N == self.concepts
-
-
 def learn_explainers(
     names: Iterable[str],
     registrations: Registrations,
@@ -116,9 +100,9 @@ def learn_explainers(
     most_remedied: int,
     source: str,
     seed: int,
-) -> LoopExplainers:
-    """Train the encoder and fit every explainer on the split ``train``; the other split is for calibration."""
-    train, held_out = (registrations.subset(registrations.rows(split)) for split in ("train", "test"))
+) -> dict[str, Explain]:
+    """Train the encoder and fit every explainer on the split ``train``; return what attributes registrations."""
+    train = registrations.subset(registrations.rows("train"))
 
     @cache
     def model() -> Any:
@@ -132,20 +116,19 @@ def learn_explainers(
         outcomes, *seconds = evaluate_design("removal", given, source, seed, uncertainty)
         return outcomes.attach_to(given, *seconds)
 
-    def timed(name: str, given: Registrations) -> Attribution:
+    def timed(explainer: ConceptExplainer, attach: Callable, given: Registrations) -> Attribution:
         started = perf_counter()
-        attribution = answer_of(fitted[name], attach[name](given))
+        attribution = answer_of(explainer, attach(given))
         # All get the same, as the encoder sees many at once; the explainer's own seconds hold what remedies took too.
         each = (perf_counter() - started) / len(given)
         return replace(attribution, seconds_N=np.full(len(given), each))
 
-    fitted, attach, explain = {}, {}, {}
+    explain: dict[str, Explain] = {}
     for name in names:
         entry = explainer_entry(name)
-        fitted[name] = entry.made(source, seed, **(settings.get(name) or {}))
+        explainer = entry.made(source, seed, **(settings.get(name) or {}))
         reads_embeddings = entry.reads == "embeddings"
-        attach[name], explain[name] = embedded if reads_embeddings else remedied, partial(timed, name)
-        learned = train if reads_embeddings else train.subset(np.arange(len(train))[:most_remedied])
-        fitted[name].fit(attach[name](learned))
-    calibration = {name: explain_one(held_out.without_labels()) for name, explain_one in explain.items()}
-    return LoopExplainers(explain, fitted, attach, calibration, held_out.concept)
+        attach = embedded if reads_embeddings else remedied
+        explainer.fit(attach(train if reads_embeddings else train.subset(np.arange(len(train))[:most_remedied])))
+        explain[name] = partial(timed, explainer, attach)
+    return explain

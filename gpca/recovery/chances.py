@@ -11,6 +11,7 @@ import numpy as np
 from gpca.causes.policy import NOTHING, QUEUE, Decision
 from gpca.errors import InputError
 from gpca.evaluation.conformal import upper_bound
+from gpca.explainers.classifiers import standardized_regression
 
 INVERSE_REGULARIZATION = 0.3  # C of scikit-learn, chosen on development seeds; smaller is closer to the mean rate
 FOLDS = 8  # of the tables
@@ -32,13 +33,6 @@ class FailureGate:
         return bool(self.failure(observed_F[None])[0] > self.threshold)
 
 
-def regression() -> Any:
-    """Return a logistic regression on standardized features, to be fitted."""
-    from gpca.explainers.classifiers import standardized_regression
-
-    return standardized_regression(INVERSE_REGULARIZATION)
-
-
 def learn_gate(
     observed_N_F: np.ndarray, failed_N: np.ndarray, table_N: Sequence[object], false_alarms: float
 ) -> FailureGate:
@@ -51,7 +45,8 @@ def learn_gate(
             raise InputError("recovery", fault, "raise recovery.train, recovery.rehearsals or recovery.tables")
 
     def fitted(rows_N: np.ndarray) -> FailureGate:
-        return FailureGate(regression().fit(observed_N_F[rows_N], failed_N[rows_N]))
+        regression = standardized_regression(INVERSE_REGULARIZATION)
+        return FailureGate(regression.fit(observed_N_F[rows_N], failed_N[rows_N]))
 
     fold_N = group_N % FOLDS
     failure_N = np.full(len(failed_N), np.nan)
@@ -87,7 +82,8 @@ class Chances:
             if right_N.all() or not right_N.any():
                 self._models[name] = float((right_N.sum() + 1) / (len(right_N) + 2))
             else:
-                self._models[name] = regression().fit(np.array([trial.known_F for trial in rows]), right_N)
+                regression = standardized_regression(INVERSE_REGULARIZATION)
+                self._models[name] = regression.fit(np.array([trial.known_F for trial in rows]), right_N)
 
     def of(self, name: str, known_F: np.ndarray) -> float:
         """Return the probability that the pose is right after the action, or as it is for `NOTHING`."""

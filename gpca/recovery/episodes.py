@@ -70,7 +70,6 @@ def register_after(
 def register_held(
     situation: Situation, holding: Holding, settings: LoopSettings, actions: tuple[str, ...] = ()
 ) -> Attempt | None:
-    """Align the object's fused points to its model by ICP, from the initial pose."""
     started, points = perf_counter(), settings.cloud_points
     objects, model, d = situation.shelf.objects, situation.model, situation.diameter_m
     cloud_m = fuse(holding.shots, d, holding.filtered)
@@ -132,7 +131,6 @@ class Episode:
 
 
 def is_right(attempt: Attempt | None, success: float) -> bool:
-    """Whether there is a pose, and a right one."""
     return attempt is not None and attempt.error < success
 
 

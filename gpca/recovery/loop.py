@@ -110,7 +110,6 @@ class Loop:
         return pd.DataFrame([rows[n] for n in order]), pd.DataFrame([seconds[n] for n in order])
 
     def _decision(self, name: str, decide: Decide, case: Case) -> Decision:
-        """Return what a policy, perhaps one from outside, decides; InputError for what nobody could do."""
         decision, subject = decide(case), f"recovery policy '{name}'"
         if not isinstance(decision, Decision) or not all(isinstance(text, str) for text in vars(decision).values()):
             raise InputError(subject, f"returns a {type(decision).__name__}", "make it return a Decision of texts")
@@ -122,7 +121,6 @@ class Loop:
     def _step(
         self, episode: Episode, name: str, entry: PolicyEntry, decide: Decide, before: Taken, history: Sequence[Answer]
     ) -> tuple[dict, dict]:
-        """Let one policy decide and act; return its row and its seconds."""
         reenacted = self.reenactor.reenact(episode, before) if entry.reenacts else None
         started = perf_counter()
         decision = self._decision(

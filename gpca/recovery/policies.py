@@ -19,7 +19,6 @@ from gpca.recovery.chances import ExpectedUtility, FailureGate
 if TYPE_CHECKING:
     from gpca.recovery.reenactment import CauseEffects
 
-POSE = "pose"  # the concept whose treatment is a repair
 Order = tuple[str, ...]  # a sequence of actions
 SEQUENCE = "sequence"  # prefix of the names of fixed sequences, such as sequence_reinitialize_new_view
 ALWAYS = "always_"  # prefix of the names of policies that always take one action
@@ -98,7 +97,6 @@ def weigh_chances(means: Means, alarmed: bool = False) -> Decide:
 
 
 def act_at_random(means: Means) -> Decide:
-    """Take a random action, possibly repeatedly."""
 
     def decide(case: Case) -> Decision:
         # The random numbers restart at every decision, so earlier draws are repeated.
@@ -118,11 +116,6 @@ def act_in_turn(means: Means) -> Decide:
     return decide
 
 
-def follow_rehearsed(means: Means) -> Decide:
-    """Take the actions in the best order on the rehearsals, whatever the cause."""
-    return follow_sequence(means.order)(means)
-
-
 def follow_reenactment(means: Means) -> Decide:
     """Treat the cause with the largest effect in the re-enactment; each action repeats only after all others."""
     treatments = means.policy.treatments
@@ -138,27 +131,21 @@ def follow_reenactment(means: Means) -> Decide:
     return decide
 
 
-def _gate_alarms(means: Means, case: Case) -> bool:
-    assert means.gate is not None and case.observed_F is not None
-    return means.gate.alarms(case.observed_F)
-
-
-def _reenactment_alarms(means: Means, case: Case) -> bool:
-    assert means.alarm is not None and case.reenacted is not None
-    return case.reenacted.belief.failure > means.alarm
-
-
-def gated(make: MakePolicy, alarms: Callable[[Means, Case], bool] = _gate_alarms) -> MakePolicy:
-    """Let a policy act only if there is an alarm at the start; a later decision means that the pose is still wrong."""
+def gated(make: MakePolicy) -> MakePolicy:
+    """Let a policy act only if the gate, or the re-enactment that it reads, raises an alarm at the start."""
 
     def make_gated(means: Means) -> Decide:
         decide, good = make(means), Decision(NOTHING, "", "it is taken for good")
-        return lambda case: decide(case) if case.actions or alarms(means, case) else good
+
+        def alarms(case: Case) -> bool:
+            if case.reenacted is not None and means.alarm is not None:
+                return case.reenacted.belief.failure > means.alarm
+            assert means.gate is not None and case.observed_F is not None
+            return means.gate.alarms(case.observed_F)
+
+        return lambda case: decide(case) if case.actions or alarms(case) else good
 
     return make_gated
-
-
-_alarmed = partial(gated, alarms=_reenactment_alarms)
 
 
 def follow_truth(means: Means) -> Decide:
@@ -171,15 +158,23 @@ def repairing(make: MakePolicy) -> MakePolicy:
     """Let a policy choose only after the pose was searched anew, for which nothing in the world has to move."""
 
     def make_repairing(means: Means) -> Decide:
-        decide, first = make(means), means.policy.treatments[POSE]
+        decide, first = make(means), means.policy.treatments["pose"]
         return lambda case: decide(case) if case.actions else Decision(first, "", "repair before anything moves")
 
     return make_repairing
 
 
-def follow_sequence(order: Order, reason: str = "next of a fixed sequence") -> MakePolicy:
-    """Take the actions of a sequence in turn, whatever is observed."""
-    return lambda means: lambda case: Decision(order[len(case.actions) % len(order)], "", reason)
+def follow_sequence(order: Order = (), reason: str = "next of a fixed sequence") -> MakePolicy:
+    """Take the actions of a sequence in turn, whatever is observed; by default the best order on the rehearsals."""
+
+    def make(means: Means) -> Decide:
+        taken = order or means.order
+        return lambda case: Decision(taken[len(case.actions) % len(taken)], "", reason)
+
+    return make
+
+
+follow_rehearsed = follow_sequence()
 
 
 def best_order(
@@ -231,9 +226,9 @@ POLICIES = {
     "error_only": PolicyEntry("Error only, gated", gated(follow_rehearsed), rehearsed=True, **_GATED),
     "error_only_acting": PolicyEntry("Error only, alarmed", follow_rehearsed, rehearsed=True),
     "reenact": PolicyEntry("Re-enactment", follow_reenactment, reenacts=True),
-    "reenact_gated": PolicyEntry("Re-enactment, gated", _alarmed(follow_reenactment), **_BY_REENACTMENT),
+    "reenact_gated": PolicyEntry("Re-enactment, gated", gated(follow_reenactment), **_BY_REENACTMENT),
     "error_only_reenact": PolicyEntry(
-        "Error only, re-enactment's gate", _alarmed(follow_rehearsed), rehearsed=True, **_BY_REENACTMENT
+        "Error only, re-enactment's gate", gated(follow_rehearsed), rehearsed=True, **_BY_REENACTMENT
     ),
     "shap_removal": PolicyEntry("SHAP, remedies, residual", never_queue, explainer="shap_removal_residual"),
     "softmax_head": PolicyEntry("Softmax head", never_queue, explainer="softmax_head"),
@@ -246,17 +241,14 @@ POLICIES = {
 
 
 def named_policies() -> dict[str, PolicyEntry]:
-    """Return the policies with names of their own, including plugins."""
     return joined_outside("POLICIES", "recovery policy", PolicyEntry, POLICIES)
 
 
 def policy_module(name: str) -> str | None:
-    """Return the plugin module that lists the policy; None for built-in policies."""
     return module_outside("POLICIES", "recovery policy", PolicyEntry, name)
 
 
 def is_fixed(name: str, actions: Sequence[str]) -> bool:
-    """Return whether the policy takes a fixed sequence of actions, whatever it observes."""
     return name in policies(actions) and name not in named_policies()
 
 
@@ -274,7 +266,6 @@ def policies(actions: Sequence[str]) -> dict[str, PolicyEntry]:
 
 
 def policy_entry(name: str, actions: Sequence[str]) -> PolicyEntry:
-    """Return a policy by name; InputError where there is none such."""
     entries = policies(actions)
     require_known("recovery policy", name, entries)
     return entries[name]

@@ -117,7 +117,6 @@ def believe(
     appearance = Appearance(holding.shots, shape.mesh)
 
     def evidence(T: np.ndarray, width: float) -> float:
-        """Return the log-probability of the pixels around the object under a hypothesis."""
         explained = appearance.explained(_placed(holding, shape, T), d * max(NEAR, 2.5 * width))
         return PIXELS * (explained * float(np.log(1 - UNEXPLAINED)) + (1 - explained) * float(np.log(UNEXPLAINED)))
 
@@ -129,7 +128,6 @@ def believe(
 
 
 def reenact(belief: Belief, holding: Holding, shape: KnownModel, truth: CauseSettings, axes: tuple) -> CauseEffects:
-    """Register with every subset of the causes, under each hypothesis in turn."""
     started, random, error_K_8 = perf_counter(), generator(*axes, "clouds"), []
     for hypothesis in belief.hypotheses:
         observation = observe(belief.observed, hypothesis, shape.surface, shape.scale, random)

@@ -8,7 +8,7 @@ import numpy as np
 
 from gpca.causes.policy import NOTHING, RecoveryPolicy
 from gpca.recovery.actions import Action
-from gpca.recovery.answers import Answer, Answers, CaseKey, Explain, LoopExplainers
+from gpca.recovery.answers import Answer, Answers, CaseKey, Explain
 from gpca.recovery.chances import FailureGate, Trial, learn_gate
 from gpca.recovery.episodes import Episode
 from gpca.recovery.policies import Means, Order, best_order
@@ -63,7 +63,6 @@ def rehearse(
 def rehearsed_order(
     failures: Sequence[Episode], actions: Mapping[str, Action], costs: Mapping[str, float], settings: LoopSettings
 ) -> Order:
-    """The order of all actions that recovers these failures soonest, see :func:`best_order`."""
     solved = [partial(episode.solved_by, by_name=actions, settings=settings) for episode in failures]
     return best_order(tuple(actions), costs, solved, settings.budget)
 
@@ -83,8 +82,7 @@ def robot_policy(recovery: Mapping, rehearsal: Rehearsal | None) -> RecoveryPoli
     return RecoveryPolicy.of_settings(recovery["thresholds"], recovery["treatments"], attempts, bald_N)
 
 
-def summary(means: Means, explainers: LoopExplainers) -> dict:
-    """Thresholds, treatments, order and the explainers' accuracy on the calibration samples, for JSON."""
+def summary(means: Means) -> dict:
     policy, gate = means.policy, means.gate
     thresholds = asdict(policy.thresholds) | ({"gate": gate.threshold} if gate else {})
     thresholds |= {"alarm": means.alarm} if means.alarm is not None else {}
@@ -92,6 +90,4 @@ def summary(means: Means, explainers: LoopExplainers) -> dict:
         "thresholds": {name: round(value, 6) for name, value in thresholds.items()},
         "treatments": dict(policy.treatments),
         "order": list(means.order),
-        "calibration_samples": len(explainers.concepts),
-        "calibration_accuracy": {n: round(float(explainers.right(n).mean()), 6) for n in explainers.calibration},
     }

@@ -66,7 +66,7 @@ def run(job: Job) -> None:
     with record_provenance(outputs, data_files(objects), job.settings, seed=job.seed):
         tables = lay_tables(surfaces(objects, job.downloads), settings, *axes)
         registered = register_situations(tables, recovery["train"], recovery["calibration"], loop)
-        explainers = learn_explainers(
+        explain = learn_explainers(
             [name for name in dict.fromkeys(entry.explainer for entry in entries) if name],
             as_samples(registered),
             settings.encoder,
@@ -79,20 +79,17 @@ def run(job: Job) -> None:
         rehearsals = replace(loop, failures=recovery["rehearsals"])
         rehearsed = find_episodes(tables["rehearsals"], rehearsals) if learning else []
         learner = next((entry.explainer for entry in entries if entry.learns or entry.queues), "")
-        explain = explainers.explain.get(learner)
-        rehearsal = rehearse(rehearsed, actions, learner, explain, loop) if explain else None
+        rehearsal = rehearse(rehearsed, actions, learner, explain[learner], loop) if learner else None
         means = _means(recovery, entries, actions, registered, rehearsed, rehearsal, loop)
         reenactor = Reenactor(settings.reenactment, settings.counterfactuals)
         if any(entry.alarmed for entry in entries):
             fresh = [*registered["train"], *registered["test"], *rehearsed]  # of which it has learned nothing
             means = replace(means, alarm=calibrated_alarm(fresh, reenactor, recovery["gate"]["false_alarms"]))
-        content = summary(means, explainers)
+        content = summary(means)
         print(json.dumps(content), file=sys.stderr)
         write_text(job.policy, json.dumps(content, indent=1, sort_keys=True) + "\n")
         episodes = find_episodes(tables["failures"], loop)
-        rows, seconds = Loop(episodes, actions, explainers.explain, means, loop, axes, reenactor).run(
-            recovery["policies"]
-        )
+        rows, seconds = Loop(episodes, actions, explain, means, loop, axes, reenactor).run(recovery["policies"])
         write_csv(job.rows, rows)
         write_csv(job.timings, seconds)
         views = recovery["actions"].get(ACTION) or {}

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from gpca.alignment.batched_icp import BatchedICP
+from gpca.alignment.batched_icp import AnyICP, icp_to
 from gpca.alignment.icp import ICPSettings
 from gpca.alignment.methods.interface import Outcome, Pair
 from gpca.alignment.methods.registry import make_method
@@ -284,9 +284,9 @@ class Rivals:
         return transform(self.pair.T_init, self.pair.observed)
 
     @cached_property
-    def registrar(self) -> BatchedICP:
+    def registrar(self) -> AnyICP:
         """The registration's ICP, of the observed cloud to the model."""
-        return BatchedICP(self.pair.model, self.icp)
+        return icp_to(self.pair.model, self.icp)
 
     def built_in(self) -> list[Tried]:
         """Return `BUILT_IN`."""

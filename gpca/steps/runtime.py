@@ -13,7 +13,7 @@ import numpy as np
 from gpca.active_learning.acquisition import select
 from gpca.active_learning.rounds import LabelingTask, initial_gpc, make_task, pool_of
 from gpca.active_learning.settings import ActiveLearningSettings
-from gpca.alignment.batched_icp import BatchedICP
+from gpca.alignment.batched_icp import icp_to
 from gpca.alignment.icp import ICP
 from gpca.classifier.gpc import GPC
 from gpca.classifier.latents import Projection
@@ -115,7 +115,7 @@ def time_stages(
     """Times of ICP, feature extraction by the explainer of each device, posterior sampling and the scores."""
     source, target = pair
     start = np.eye(4)
-    poses, elapsed = timed(lambda: BatchedICP(target, model.icp).register(source, start[None])[0])
+    poses, elapsed = timed(lambda: icp_to(target, model.icp).register(source, start[None])[0])
     yield ("icp", "CPU"), elapsed
     yield ("icp_open3d", "CPU"), timed(lambda: ICP(target, None, model.icp).register(source, start))[1]
     aligned = transform(poses[0], source)

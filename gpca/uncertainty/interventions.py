@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gpca.alignment.batched_icp import BatchedICP
+from gpca.alignment.batched_icp import AnyICP, icp_to
 from gpca.pairs.perturbation import within_half_space
 from gpca.rigid import random_direction, transform
 from gpca.uncertainty.settings import Remedies, UncertaintySettings
@@ -69,7 +69,7 @@ class KnobRuns:
         source, self._target, self._T_init, self.T_ref = clouds
         self._xi_n_6, self._settings, random = draws
         self._source = KnobbedSource(source, random)
-        self._icp = BatchedICP(self._target, self._settings.icp)
+        self._icp = icp_to(self._target, self._settings.icp)
         self._seen: dict[Knobs, Spread] = {}
 
     def __call__(self, knobs: Knobs) -> Spread:
@@ -124,16 +124,16 @@ class RemedyRuns:
         return cKDTree(points), points
 
     @cached_property
-    def _untrimmed(self) -> tuple[BatchedICP, np.ndarray]:
+    def _untrimmed(self) -> tuple[AnyICP, np.ndarray]:
         return self._seen(self._target)
 
     @cached_property
-    def _trimmed(self) -> tuple[BatchedICP, np.ndarray]:
+    def _trimmed(self) -> tuple[AnyICP, np.ndarray]:
         aligned = transform(self._T_icp, self._observed)
         return self._seen(trim(self._target, aligned, self._settings.icp.correspondence_distance))
 
-    def _seen(self, target: np.ndarray) -> tuple[BatchedICP, np.ndarray]:
-        return BatchedICP(target[: self._settings.icp_points], self._settings.icp), target
+    def _seen(self, target: np.ndarray) -> tuple[AnyICP, np.ndarray]:
+        return icp_to(target[: self._settings.icp_points], self._settings.icp), target
 
 
 def denoise(points: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ from time import perf_counter
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gpca.alignment.batched_icp import BatchedICP
+from gpca.alignment.batched_icp import AnyICP
 from gpca.alignment.icp import clipped_cost
 from gpca.rigid import exp, inverse, log, transform
 from gpca.uncertainty.settings import UncertaintySettings
@@ -52,7 +52,7 @@ class Runs:
         return not self.fitness_n.any() or bool(spread < 6 * floor)
 
 
-def run_from_starts(icp: BatchedICP, source: np.ndarray, T_target_source_init: np.ndarray, xi_n_6: np.ndarray) -> Runs:
+def run_from_starts(icp: AnyICP, source: np.ndarray, T_target_source_init: np.ndarray, xi_n_6: np.ndarray) -> Runs:
     """Run ICP from the starts exp(ξ) T_init."""
     starts_n = exp(xi_n_6) @ T_target_source_init
     started = perf_counter()

@@ -317,14 +317,6 @@ def test_nothing_is_said_of_a_pair_without_meaning(name, threshold, model, pair)
         assert word not in text
 
 
-def test_gpca_alone_knows_nothing_of_such_a_pair_either(explainer, pair):
-    source, target = pair
-    said = explainer.explain(source + 5, target, diagnose=False)
-    assert said.unknown
-    assert said.action == CHECK
-    assert "state     unknown" in said.text()
-
-
 ANY_SIZE = Familiarity({"size": (0.0, np.inf)})
 
 

@@ -112,15 +112,15 @@ def test_a_source_in_a_unit_of_its_own_gives_results_in_that_of_the_target(expla
 def test_many_are_explained_as_one_by_one_and_a_fault_names_its_pair(explainer, pair):
     source, target = pair
     T_init = exp(np.array([[0.1, 0, 0, 0, 0, 0]]))[0]
-    first, second = explainer.explain_many([(source, target), (source, target, T_init)], diagnose=False)
+    first, second = explainer.explain_many([(source, target), (source, target, T_init)])
     for many, one in (
-        (first, explainer.explain(source, target, diagnose=False)),
-        (second, explainer.explain(source, target, T_init, diagnose=False)),
+        (first, explainer.explain(source, target)),
+        (second, explainer.explain(source, target, T_init)),
     ):
         assert many.scores == one.scores
         np.testing.assert_array_equal(many.T_target_source, one.T_target_source)
     with pytest.raises(InputError, match="pair 1: source: has 10 points"):
-        list(explainer.explain_many([(source, target), (source[:10], target)], diagnose=False))
+        list(explainer.explain_many([(source, target), (source[:10], target)]))
 
 
 FAR = "initial pose: puts the source .* diameters .* translation in m"

@@ -12,7 +12,7 @@ from gpca.errors import InputError
 
 @pytest.fixture(scope="module")
 def explained(explainer, pair):
-    return explainer.explain(*pair, diagnose=False)
+    return explainer.explain(*pair)
 
 
 def test_a_queue_grows_by_one_and_keeps_what_it_had(explainer, explained, tmp_path):

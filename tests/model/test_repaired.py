@@ -33,7 +33,7 @@ def judging(model, *calibrated):
 def wrong(model, pair):
     """A model, the clouds, and a pose that is a quarter of the diameter off."""
     source, target = pair
-    T = Explainer(model, device="cpu").explain(source, target, diagnose=False).T_target_source
+    T = Explainer(model, device="cpu").explain(source, target).T_target_source
     return judging(model, 0.5), pair, shifted(0.25 * np.linalg.norm(np.ptp(target, axis=0))) @ T
 
 

@@ -63,7 +63,6 @@ def test_the_step_writes_rows_seconds_thresholds_and_an_example(tmp_path):
     assert len(seconds) == len(rows)
     assert (rows["failed"] == (rows.groupby(["episode", "policy"])["error_before"].transform("first") >= 0.03)).all()
     policy = json.loads((tmp_path / "policy.json").read_text())
-    assert set(policy["calibration_accuracy"]) == {"gpca", "softmax_head"}
     assert 0 <= policy["thresholds"]["uncertain"] < 1.1
     assert 0 <= policy["thresholds"]["gate"] <= 1
     assert 0 <= policy["thresholds"]["alarm"] <= 1

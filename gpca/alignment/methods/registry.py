@@ -30,24 +30,20 @@ def left_out(names: Iterable[str]) -> dict[str, str]:
 
 
 def installed(names: Iterable[str]) -> list[str]:
-    """Return the methods of these names that can run here."""
     return [name for name in names if not left_out([name])]
 
 
 def require_settings(name: str, settings: Mapping[str, object]) -> None:
-    """Raise an InputError unless the method is known and takes these settings."""
     require_arguments(f"registration method '{name}'", method_entry(name).align, 1, settings)
 
 
 def require_global(name: str) -> None:
-    """Raise an InputError unless the method is known and needs no initial pose."""
     if not method_entry(name).is_global:
         known = ", ".join(other for other, entry in methods().items() if entry.is_global)
         raise InputError(f"registration method '{name}'", "needs an initial pose", f"choose one of {known}")
 
 
 def require_local(name: str) -> None:
-    """Raise an InputError unless the method is known, installed, and starts at an initial pose."""
     if method_entry(name).is_global:
         remedy = "choose one that starts at an initial pose"
         raise InputError(f"registration method '{name}'", "is global, so its results have no spread", remedy)

@@ -161,7 +161,6 @@ def align_variant(
 
 
 def sample_at_random(pair: Pair) -> np.ndarray:
-    """Return the rows of a share of the source's points."""
     return _share_of(generator("sampling", "random", pair.seed).permutation(len(pair.source)))
 
 
@@ -185,18 +184,15 @@ def _share_of(order_N: np.ndarray) -> np.ndarray:
 
 
 def reject_distance(matches: Matches) -> Matches:
-    """Keep distances that are not far above their mean."""
     distance_n = matches.distance
     return matches.kept(distance_n <= distance_n.mean() + DEVIATIONS * distance_n.std()) if len(distance_n) else matches
 
 
 def reject_normals(matches: Matches) -> Matches:
-    """Keep pairs whose normals differ by a limited angle."""
     return matches.kept(matches.cosines() >= np.cos(np.deg2rad(ANGLE_DEG)))
 
 
 def reject_worst(matches: Matches) -> Matches:
-    """Keep all but the largest distances."""
     return matches.kept(nearest(matches.distance, round((1 - WORST) * len(matches.distance))))
 
 
@@ -206,7 +202,6 @@ def weigh_distance(matches: Matches) -> np.ndarray:
 
 
 def weigh_normals(matches: Matches) -> np.ndarray:
-    """Return the cosines between the normals (n,) as weights."""
     return np.clip(matches.cosines(), 0, 1)
 
 
