@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gpca.attribution import weighted
+from gpca.attribution import diagnostics
 from gpca.attribution.diagnostics import LEAST_PROBABILITY
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.errors import InputError
@@ -81,7 +81,7 @@ def estimates_of_scores(rows: Frame, samples: Clustered) -> dict[str, Estimate]:
         "accuracy": samples.share(~wrong(rows)),
         "confidence": samples.mean(p_S_C.max(axis=1), (0, 1)),
         "ece": samples.over_seeds(
-            lambda of, weights_B_n: weighted.calibration_error(p_S_C[of], target_S[of], weights_B_n), (0, 1)
+            lambda of, weights_B_n: diagnostics.calibration_error(p_S_C[of], target_S[of], weights_B_n), (0, 1)
         ),
         "nll": samples.mean(-np.log(p_true_S), (0, np.inf)),
         "brier": samples.mean(squares_S, (0, 2)),

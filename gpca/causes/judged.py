@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
+from gpca.attribution.diagnostics import augrc
 from gpca.attribution.predictions import read_predictions
-from gpca.attribution.weighted import augrc
 from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.causes.truth import ALL, BORDERLINE, FAILED, NOMINAL, Truth
 from gpca.errors import InputError

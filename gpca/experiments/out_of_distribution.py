@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from gpca.attribution import diagnostics, weighted
+from gpca.attribution import diagnostics
 from gpca.attribution import learner_predictions as predicted
 from gpca.declarations.experiment import ByName, Experiment, LeftOut, Names
 from gpca.declarations.plan import Run
@@ -31,7 +31,7 @@ from gpca.steps.shift import ShiftSettings
 
 TABLE = "learners/"  # prefix of the set in the column `table` of the numbers
 RHO = f"rho_max_score_{DISTANCES[0]}"
-AREAS = {"aurc": weighted.aurc, "excess_aurc": weighted.excess_aurc, "augrc": weighted.augrc}
+AREAS = {"aurc": diagnostics.aurc, "excess_aurc": diagnostics.excess_aurc, "augrc": diagnostics.augrc}
 
 _SHIFT = changes_of(ShiftSettings, without=("beyond",)).kinds
 # An encoder of another width would not fit beside the others.
@@ -129,7 +129,7 @@ def collect(run: Run, prediction_files: Paths, set_files: Paths) -> tuple[Frame,
         for name, subset in predicted.sets_of(pd.concat(parts, ignore_index=True)).items():
             samples = Clustered.drawn(subset["seed"], clusters_of(subset), "learner intervals", source, name)
             score_S, wrong_S = subset["max_score"].to_numpy(float), predicted.wrong(subset)
-            correlation = partial(_of_rows, weighted.rank_correlation, score_S, subset[DISTANCES[0]].to_numpy(float))
+            correlation = partial(_of_rows, diagnostics.rank_correlation, score_S, subset[DISTANCES[0]].to_numpy(float))
             estimates = {RHO: samples.over_seeds(correlation, (-1, 1))}
             if "+" not in name:
                 estimates |= predicted.estimates_of_scores(subset, samples)

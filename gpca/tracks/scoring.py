@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gpca.attribution.weighted import augrc
+from gpca.attribution.diagnostics import augrc
 from gpca.causes.dataset import LABELS
 from gpca.causes.judged import CEILING, SHARES, Judged, ceiling_of, counted, joined, judged_of, measure, ranking
 from gpca.causes.truth import BORDERLINE, NOMINAL

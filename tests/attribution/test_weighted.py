@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gpca.attribution import diagnostics, weighted
+from gpca.attribution import diagnostics
 
 S = 30
 RANDOM = np.random.default_rng(0)
@@ -21,26 +21,26 @@ def repeated(function, *arrays):
 
 def test_calibration_errors_are_those_of_repeated_samples():
     expected = repeated(diagnostics.calibration_error, P, TARGET)
-    assert weighted.calibration_error(P, TARGET, WEIGHTS) == pytest.approx(expected)
+    assert diagnostics.calibration_error(P, TARGET, WEIGHTS) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("name", ["aurc", "excess_aurc", "augrc"])
 @pytest.mark.parametrize("confidence", [P.max(axis=1), TIED, np.zeros(S)])
 def test_areas_are_those_of_repeated_samples(name, confidence):
     expected = repeated(getattr(diagnostics, name), confidence, WRONG)
-    assert getattr(weighted, name)(confidence, WRONG, WEIGHTS) == pytest.approx(expected)
+    assert getattr(diagnostics, name)(confidence, WRONG, WEIGHTS) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("one", [P.max(axis=1), TIED, np.zeros(S)])
 def test_rank_correlations_are_those_of_repeated_samples(one):
     expected = repeated(diagnostics.rank_correlation, one, OTHER)
-    assert weighted.rank_correlation(one, OTHER, WEIGHTS) == pytest.approx(expected)
+    assert diagnostics.rank_correlation(one, OTHER, WEIGHTS) == pytest.approx(expected)
 
 
 def test_a_draw_of_alike_samples_has_no_order_and_one_without_any_no_value():
     weights = np.zeros((2, S))
     weights[0, :2] = 3
     one = np.append([0.1, 0.1], np.arange(S - 2))
-    assert weighted.rank_correlation(one, OTHER, weights)[0] == 0
-    assert np.isnan(weighted.aurc(one, WRONG, weights)[1])
-    assert np.isnan(weighted.calibration_error(P, TARGET, weights)[1])
+    assert diagnostics.rank_correlation(one, OTHER, weights)[0] == 0
+    assert np.isnan(diagnostics.aurc(one, WRONG, weights)[1])
+    assert np.isnan(diagnostics.calibration_error(P, TARGET, weights)[1])
