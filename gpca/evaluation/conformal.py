@@ -7,16 +7,12 @@ of similar shapes, where the new sample belongs to a new family.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, inf
-from typing import Literal
 
 import numpy as np
 
 from gpca.errors import InputError
 
 ROUNDING = 1e-9  # tolerance of a sum of weights
-Nonconformity = Literal["probability", "cumulative"]
-PROBABILITY: Nonconformity = "probability"
-CUMULATIVE: Nonconformity = "cumulative"
 GOOD, NOT_SURE, ALARM = OUTCOMES = ("good", "not sure", "failed")
 
 
@@ -58,36 +54,20 @@ def highest_level(family_N: np.ndarray) -> float:
 
 @dataclass(frozen=True)
 class StateSets:
-    """Sets of states with limits on their nonconformity, which are infinity where there were too few samples."""
+    """Sets of states by limits on 1 - score (Sadinle, Lei and Wasserman 2019), infinite for too few samples."""
 
     states: tuple[str, ...]  # names of the K columns of scores
     level: float  # probability that a set contains the true state
-    nonconformity: Nonconformity  # see :func:`nonconformity`
     by_state: bool  # whether the level holds for each state separately (Mondrian) instead of on average
-    limits: tuple[float, ...]  # (K,) largest nonconformity of each state in a set
+    limits: tuple[float, ...]  # (K,) largest of each state in a set
 
     def of(self, scores_M_K: np.ndarray) -> np.ndarray:
         """Return which states (M, K) are in the set of each of M samples; no set is empty."""
         require_scores(scores_M_K, self.states)
-        inside_M_K = nonconformity(scores_M_K, self.nonconformity) <= np.array(self.limits)
+        inside_M_K = 1 - scores_M_K <= np.array(self.limits)
         empty_M = ~inside_M_K.any(axis=1)
         inside_M_K[empty_M, scores_M_K[empty_M].argmax(axis=1)] = True
         return inside_M_K
-
-
-def nonconformity(scores_N_K: np.ndarray, kind: Nonconformity) -> np.ndarray:
-    """Return the nonconformity (N, K) of each state for each sample.
-
-    ``probability``, 1 minus the score, gives the smallest sets (Sadinle, Lei and Wasserman 2019); ``cumulative``, the
-    sum of all scores that are at least as large, covers hard samples more evenly (Romano, Sesia and Candès 2020,
-    without randomization).
-    """
-    if kind == PROBABILITY:
-        return 1 - scores_N_K
-    if kind != CUMULATIVE:
-        raise InputError(f"nonconformity '{kind}'", "unknown", f"choose {PROBABILITY} or {CUMULATIVE}")
-    as_large_N_K_K = scores_N_K[:, None, :] >= scores_N_K[:, :, None]
-    return (as_large_N_K_K * scores_N_K[:, None, :]).sum(axis=2)
 
 
 def calibrate_sets(
@@ -96,7 +76,6 @@ def calibrate_sets(
     family_N: np.ndarray | None,
     states: Sequence[str],
     level: float,
-    kind: Nonconformity = PROBABILITY,
     by_state: bool = False,
 ) -> StateSets:
     """Calibrate sets that contain the true state of a new sample with a probability of at least `level`."""
@@ -106,10 +85,10 @@ def calibrate_sets(
     if not (valid_N := is_state_N_K.any(axis=1)).all():
         raise InputError(f"state '{state_N[~valid_N][0]}'", "unknown", f"choose one of {', '.join(states)}")
     number_N = is_state_N_K.argmax(axis=1)
-    value_N = nonconformity(scores_N_K, kind)[np.arange(len(number_N)), number_N]
+    value_N = 1 - scores_N_K[np.arange(len(number_N)), number_N]
     masks = [number_N == number if by_state else np.ones(len(value_N), bool) for number in range(len(states))]
     limits = (upper_bound(value_N[mask_N], level, None if family_N is None else family_N[mask_N]) for mask_N in masks)
-    return StateSets(tuple(states), level, kind, by_state, tuple(limits))
+    return StateSets(tuple(states), level, by_state, tuple(limits))
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from math import floor
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -50,7 +50,6 @@ class GuaranteeSettings:
     false_alarms: OpenShare = 0.05  # largest probability that a good registration is called failed
     family_risk: OpenShare = 0.1  # both for calibration by family; there are too few families for a smaller one
     confidence: OpenShare = 0.9  # with which both hold for the thresholds themselves, in a row of its own
-    nonconformity: Literal["probability", "cumulative"] = "probability"  # score of how badly a state fits
 
 
 @dataclass(frozen=True)
@@ -141,7 +140,7 @@ def answers_of(scored: Scored, condition: Condition, settings: GuaranteeSettings
     """Sets and calls for all tested rows, or None; a family's thresholds are calibrated on others, by one model."""
     probabilities_N_5 = state_scores(scored.scores)
     family_N = np.unique(scored.family, return_inverse=True)[1]
-    limits = {name: getattr(settings, name) for name in ("level", "missed", "false_alarms", "nonconformity")}
+    limits = {name: getattr(settings, name) for name in ("level", "missed", "false_alarms")}
     risks = {"missed": settings.family_risk, "false_alarms": settings.family_risk}
     rows, sets, calls, counts = [], [], [], []
     for model in dict.fromkeys(scored.model[condition.tested].tolist()):

@@ -13,7 +13,7 @@ from gpca.causes.dataset import LABELS, labels_of
 from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL, Truth
 from gpca.errors import InputError
 from gpca.evaluation import conformal
-from gpca.evaluation.conformal import FailureAlarm, Nonconformity, StateSets
+from gpca.evaluation.conformal import FailureAlarm, StateSets
 
 SEVERAL = "several"
 STATES = (*LABELS, SEVERAL)
@@ -68,9 +68,11 @@ class Guarantee:
 
     @classmethod
     def from_dict(cls, plain: Mapping[str, Any]) -> Guarantee:
-        """Invert :meth:`to_dict`; an InputError for missing or wrong values."""
+        """Invert :meth:`to_dict`, also of files that name the kind of sets; an InputError for wrong values."""
         try:
-            sets, alarm = plain["sets"], plain["alarm"]
+            sets, alarm = dict(plain["sets"]), plain["alarm"]
+            if (kind := sets.pop("nonconformity", "probability")) != "probability":
+                raise ValueError(f"sets by {str(kind)[:40]}")
             limits = tuple(inf if x is None else float(x) for x in sets["limits"])
             bounds = {name: none if alarm[name] is None else float(alarm[name]) for name, none in BOUNDS.items()}
             state_sets = StateSets(**{**sets, "states": tuple(sets["states"]), "limits": limits})
@@ -92,7 +94,6 @@ def calibrate(
     level: float = 0.9,
     missed: float = 0.05,
     false_alarms: float = 0.05,
-    nonconformity: Nonconformity = conformal.PROBABILITY,
     by_state: bool = False,
     confidence: float | None = None,
 ) -> Guarantee:
@@ -109,7 +110,7 @@ def calibrate(
     clear_N = state_N != BORDERLINE
     family_n = None if family_N is None else np.asarray(family_N)[clear_N]
     scores_n_K, state_n = np.asarray(scores_N_K, float)[clear_N], state_N[clear_N]
-    sets = conformal.calibrate_sets(scores_n_K, state_n, family_n, states, level, nonconformity, by_state)
+    sets = conformal.calibrate_sets(scores_n_K, state_n, family_n, states, level, by_state)
     failed_n = state_n != states[0]
     alarm = conformal.calibrate_alarm(1 - scores_n_K[:, 0], failed_n, family_n, missed, false_alarms, confidence)
     return Guarantee(sets, alarm, len(state_n), 0 if family_n is None else len(np.unique(family_n)))

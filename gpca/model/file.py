@@ -20,7 +20,6 @@ from gpca.classifier.settings import GPCSettings
 from gpca.encoders.inference import TrainedEncoder
 from gpca.encoders.registry import EncoderSettings
 from gpca.errors import InputError
-from gpca.evaluation.conformal import Nonconformity
 from gpca.explainers.classifiers import require_trees
 from gpca.explainers.pair_classifier import ABSENT, PRESENT
 from gpca.guarantee.guarantee import STATES, WHETHER_FAILED, Guarantee
@@ -225,11 +224,7 @@ def _require_diagnoser(state: Mapping) -> None:
     for level in levels:
         if level["guarantee"] is not None:
             sets = Guarantee.from_dict(level["guarantee"]).state_sets
-            same = (
-                sets.states in (STATES, WHETHER_FAILED)
-                and 0 < sets.level < 1
-                and sets.nonconformity in get_args(Nonconformity)
-            )
+            same = sets.states in (STATES, WHETHER_FAILED) and 0 < sets.level < 1
             _require(same, "its guarantee is of different states, or of none")
     measures = [state["held_out"], *(level.get("held_out", {}) for level in levels)]
     for name, value in (item for each in measures for item in each.items()):

@@ -8,7 +8,7 @@ from scipy.stats import beta
 
 from gpca.errors import InputError
 from gpca.evaluation import conformal
-from gpca.evaluation.conformal import ALARM, CUMULATIVE, GOOD, NOT_SURE, PROBABILITY, confident_upper_bound, upper_bound
+from gpca.evaluation.conformal import ALARM, GOOD, NOT_SURE, confident_upper_bound, upper_bound
 
 DRAWS = 4000
 
@@ -84,21 +84,12 @@ def held(sets, scores, state):
     return sets.of(scores)[np.arange(len(state)), [STATES.index(name) for name in state]]
 
 
-def test_nonconformity_by_hand():
-    scores = np.array([[0.5, 0.3, 0.2], [0.4, 0.4, 0.2]])
-    assert conformal.nonconformity(scores, PROBABILITY) == pytest.approx(1 - scores)
-    assert conformal.nonconformity(scores, CUMULATIVE) == pytest.approx(np.array([[0.5, 0.8, 1.0], [0.8, 0.8, 1.0]]))
-    with pytest.raises(InputError, match="nonconformity 'rank': unknown; choose probability or cumulative"):
-        conformal.nonconformity(scores, "rank")
-
-
-@pytest.mark.parametrize("kind", [PROBABILITY, CUMULATIVE])
-def test_sets_hold_the_true_state_as_often_as_promised(kind):
+def test_sets_hold_the_true_state_as_often_as_promised():
     random = np.random.default_rng(0)
     shares = []
     for _ in range(300):
         scores, state = drawn(random, 200)
-        sets = conformal.calibrate_sets(scores[:100], state[:100], None, STATES, 0.9, kind)
+        sets = conformal.calibrate_sets(scores[:100], state[:100], None, STATES, 0.9)
         shares.append(held(sets, scores[100:], state[100:]).mean())
     deviation = np.std(shares) / np.sqrt(300)
     assert 0.9 - 4 * deviation <= np.mean(shares) <= 0.9 + 1 / 101 + 0.03  # what is never empty covers a little more

@@ -31,7 +31,7 @@ from tests.guarantee.scored import scored_samples
 
 SECTION = {
     **{"level": 0.8, "missed": 0.05, "false_alarms": 0.05, "family_risk": 0.2, "confidence": 0.9},
-    **{"nonconformity": "probability", "explainers": ["reenact"]},
+    **{"explainers": ["reenact"]},
 }
 PROMISED = {name: value for name, value in SECTION.items() if name != "explainers"}
 SOURCES = {
@@ -145,7 +145,6 @@ def test_the_tables_say_what_was_promised_and_measured(measured):
     ("key", "value", "message"),
     [
         ("level", 1.0, "guarantee.level: 1.0 should be less than 1"),
-        ("nonconformity", "rank", "guarantee.nonconformity: 'rank' should be "),
         ("explainers", ["oracle"], "guarantee.explainers: no explainer 'oracle'; choose one of chance, "),
         ("explainers", ["chance"], "guarantee.explainers: explainer 'chance' reads neither descriptors nor"),
     ],

@@ -42,7 +42,7 @@ def test_scores_of_states_by_hand():
         state_scores(np.array([[np.nan, 0, 0, 0]]))
 
 
-@pytest.mark.parametrize("choice", [{}, {"by_state": True}, {"nonconformity": "cumulative"}, {"confidence": 0.9}])
+@pytest.mark.parametrize("choice", [{}, {"by_state": True}, {"confidence": 0.9}])
 def test_the_plain_form_is_read_back_as_it_was(choice):
     scores, state, family = drawn(np.random.default_rng(7), 400)
     guarantee = calibrate(scores, state, None if "confidence" in choice else family, **choice)
@@ -67,6 +67,10 @@ def test_borderline_samples_are_left_out_and_the_order_does_not_matter():
         (lambda plain: plain["sets"].update(limits=[1.0]), "guarantee: has not one limit for each state"),
         (lambda plain: plain["sets"].update(limits=["wide"]), "guarantee: is damaged .ValueError"),
         (lambda plain: plain["alarm"].update(colour="red"), "guarantee: is damaged .TypeError"),
+        (
+            lambda plain: plain["sets"].update(nonconformity="cumulative"),
+            "guarantee: is damaged .ValueError: sets by cu",
+        ),
     ],
 )
 def test_a_damaged_plain_form_is_one_line(spoil, message):
