@@ -5,36 +5,9 @@ import sys
 import numpy as np
 import pytest
 
-from gpca.attribution.predictions import write_predictions
-from gpca.classifier.scores import Attribution
 from gpca.pairs.perturbation import CONCEPTS
 
 LIMITS = {"nominal": 0.02, "failed": 0.03}  # of the errors that states are told apart by
-
-
-@pytest.fixture(scope="session")
-def predicted():
-    """Write registrations, and predictions on them by dice, into a folder; return their paths by name."""
-
-    def write(registrations, folder, source="bricks"):
-        npz, csv = folder / f"registrations/{source}/seed0.npz", folder / f"predictions/{source}/gpca/seed0.csv"
-        random, N = np.random.default_rng(3), len(registrations)
-        scores_N_C = random.dirichlet(np.ones(len(CONCEPTS)), N)
-        registrations.save(npz)
-        attribution = Attribution(
-            concepts=CONCEPTS,
-            scores_N_C=scores_N_C,
-            variances_N_C=random.uniform(0.001, 0.01, scores_N_C.shape),
-            bald_N=random.uniform(size=N),
-            abstained_N=np.zeros(N, dtype=bool),
-            icp_calls_N=np.zeros(N, dtype=int),
-            seconds_N=np.zeros(N),
-            icp_seconds_N=np.zeros(N),
-        )
-        write_predictions(csv, registrations, attribution)
-        return {"registrations": npz, "predictions": csv}
-
-    return write
 
 
 @pytest.fixture(scope="session")
@@ -44,7 +17,6 @@ def stage_files(registrations, tmp_path_factory):
     Pose of sample p has score 0.5 + p / 100, all are named right, and test sample p has an uncertainty of p / 10.
     """
     from gpca.io.arrays import save_arrays
-    from gpca.pairs.perturbation import CONCEPTS
 
     folder = tmp_path_factory.mktemp("stages")
     registrations.save(folder / "registrations.npz")

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 
-from gpca.alignment.icp import ICPSettings
 from gpca.causes.settings import CauseSettings
 from gpca.errors import InputError
 from gpca.io.files import write_text
@@ -18,7 +17,7 @@ from gpca.jobs.provenance import DEVICE, read_record, sha256_of_settings
 from gpca.model.scene import ASSETS
 from gpca.page.comparison import page_comparison
 from gpca.page.findings import Titles, findings_of
-from gpca.page.samples import CAUSES_RULE, POINTS, RULE, cause_samples, page_samples
+from gpca.page.samples import POINTS, RULE, cause_samples
 from gpca.reporting.registry import SUFFIXES, by_section
 
 TEMPLATES = Path(__file__).parent / "templates"
@@ -62,7 +61,6 @@ class FinishedRun:
     seeds: Sequence[int]  # of its repeats
     sources: Mapping[str, Mapping]  # name -> ``{"title": str, "stand_in": bool}``
     results: Sequence[Shown]  # tables and figures, in order
-    samples: Mapping[str, Mapping[str, str]]  # source -> files for :func:`page_samples`
     causes: Mapping[str, Mapping[str, str]]  # source -> files for :func:`cause_samples`
     titles: Titles  # of the explainers
     reference: str | None  # ``comparison.csv`` of a run on real objects, shown where nothing of this run is judged
@@ -77,7 +75,7 @@ def write_page(folder: str | Path, run: FinishedRun) -> None:
     collected files, such as ``comparison.csv``.
     """
     folder = Path(folder)
-    sample_files = [Path(path) for files in (*run.samples.values(), *run.causes.values()) for path in files.values()]
+    sample_files = [Path(path) for files in run.causes.values() for path in files.values()]
     needed = [f"{each.kind}/{each.name}.{suffix}" for each in run.results for suffix in SUFFIXES[each.kind]]
     missing = [name for name in needed if not (folder / name).is_file()]
     missing += [str(path) for path in sample_files if not path.is_file()]
@@ -93,13 +91,10 @@ def write_page(folder: str | Path, run: FinishedRun) -> None:
     key_figure = next((shown[name] for name in KEY_FIGURES if name in shown), None)
     suffix = {"tables": "csv", "figures": "pdf"}
     recorded = [folder / f"{result.kind}/{result.name}.{suffix[result.kind]}" for result in run.results]
-    icp = run.config.get("registrations", {}).get("icp", {})
-    settings = CauseSettings.from_dict(dict(run.config["causes"]), icp)
-    reach, samples = ICPSettings(**icp).correspondence_distance, []
-    for source, files in run.causes.items():  # failures first
-        samples += cause_samples(files, run.sources[source], settings)
-    for source, files in run.samples.items():
-        samples += page_samples(files, run.sources[source], settings.limits, reach)
+    settings = CauseSettings.from_dict(dict(run.config["causes"]), run.config.get("registrations", {}).get("icp", {}))
+    samples = [
+        sample for source, files in run.causes.items() for sample in cause_samples(files, run.sources[source], settings)
+    ]
     text = render(
         run=run,
         findings=findings_of(folder, run.titles, shown),
@@ -137,7 +132,7 @@ def render(template: str = "index.html.jinja", **content) -> str:
     environment.filters["short"] = short
     environment.filters["yaml"] = lambda value: yaml.safe_dump(value, sort_keys=False, allow_unicode=True, width=100)
     environment.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "sort_keys": True}
-    words = {"samples_rule": RULE, "causes_rule": CAUSES_RULE, "samples_points": POINTS}
+    words = {"samples_rule": RULE, "samples_points": POINTS}
     return environment.get_template(template).render(**content, **words)
 
 

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from tests.page.test_findings import write_intervals
 
 
 @pytest.fixture(scope="package")
-def folder(registrations, predicted, tmp_path_factory):
+def folder(four, causes, tmp_path_factory):
     """A results folder with all that the page needs."""
     folder = tmp_path_factory.mktemp("results") / "tiny"
     for name in TABLES:
@@ -48,7 +49,10 @@ def folder(registrations, predicted, tmp_path_factory):
         folder / "attribution_intervals.csv", [("bricks", "gpca", "accuracy", 0.9), ("cones", "gpca", "accuracy", 0.75)]
     )
     (folder / "metrics.csv").write_text("")
-    predicted(registrations, folder)
+    replace(causes, registrations=replace(causes.registrations, axes=("four", 100))).save(
+        folder / "causes/four/seed100.npz"
+    )
+    four.save(folder / "objects/four.npz", "four")
     write_page(folder, run_of(folder))
     return folder
 

@@ -4,6 +4,7 @@ from html.parser import HTMLParser
 
 from gpca.page.findings import Titles
 from gpca.page.page import FinishedRun, Shown
+from tests.conftest import FEW_CAUSES
 
 TABLES = ["table2_per_concept", "table1_single_baselines", "table4_mine"]
 FIGURES = ["objects_bricks", "reliability"]
@@ -54,19 +55,13 @@ def run_of(folder, **changes):
             "cones": {"title": "Cones", "stand_in": False},
         },
         "results": results(),
-        "samples": {
-            "bricks": {
-                "registrations": folder / "registrations/bricks/seed0.npz",
-                "predictions": folder / "predictions/bricks/gpca/seed0.csv",
-            }
-        },
-        "causes": {},
+        "causes": {"bricks": {"objects": folder / "objects/four.npz", "causes": folder / "causes/four/seed100.npz"}},
         "titles": Titles({"gpca": {"title": "GP-CA", "oracle": False}}, {}, {}, 3),
         "reference": None,
         "config": {
             "run": "tiny",
             "note": "</script><script>alert(1)</script>",
-            "causes": {"limits": {"nominal": 0.02, "failed": 0.03}},
+            "causes": {name: list(value) if name == "points" else value for name, value in FEW_CAUSES.items()},
         },
         "command": "snakemake -j2 results/tiny/index.html",
     }

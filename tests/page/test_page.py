@@ -101,7 +101,7 @@ def test_what_comes_from_files_cannot_become_markup(page):
     assert "&lt;/script&gt;&lt;script&gt;alert(1)" in page.text
     [text] = re.findall(r'<script type="application/json" id="samples">(.*)</script>', page.text)
     samples = json.loads(text)
-    assert [sample["concept"] for sample in samples] == ["noise"] * 2 + ["pose"] * 2 + ["overlap"] * 2
+    assert samples and {sample["state"] for sample in samples} == {"failed"}
     assert {sample["source"]["title"] for sample in samples} == {"Bricks <b>"}
 
 
@@ -131,7 +131,7 @@ def test_pages_of_the_docs_are_links_where_they_are(copied):
 def test_without_comparison_and_samples_there_is_no_word_of_them(copied):
     folder, _ = copied
     (folder / "comparison.csv").unlink()
-    write_page(folder, run_of(folder, samples={}))
+    write_page(folder, run_of(folder, causes={}))
     page = Page((folder / "index.html").read_text())
     assert "comparison-table" not in page.ids
     assert "registrations" not in page.ids
@@ -154,13 +154,13 @@ def test_records_of_provenance_are_counted(tmp_path):
 
 def test_an_incomplete_folder_names_all_that_is_missing_and_the_command(copied):
     folder, run = copied
-    for name in ("tables/table4_mine.md", "figures/reliability.pdf", "predictions/bricks/gpca/seed0.csv"):
+    for name in ("tables/table4_mine.md", "figures/reliability.pdf", "causes/four/seed100.npz"):
         (folder / name).unlink()
     with pytest.raises(InputError) as caught:
         write_page(folder, run)
     assert str(caught.value) == (
         f"{folder}: lacks tables/table4_mine.md, figures/reliability.pdf, "
-        f"{folder / 'predictions/bricks/gpca/seed0.csv'}; make them with 'snakemake -j2 results/tiny/index.html'"
+        f"{folder / 'causes/four/seed100.npz'}; make them with 'snakemake -j2 results/tiny/index.html'"
     )
     assert not (folder / "index.html").exists()
 
@@ -169,7 +169,7 @@ def test_an_incomplete_folder_names_all_that_is_missing_and_the_command(copied):
     ("damaged", "text", "fault"),
     [
         ("tiny/comparison.csv", "", "is empty"),
-        ("tiny/registrations/bricks/seed0.npz", "PK", "is not a readable npz archive"),
+        ("tiny/causes/four/seed100.npz", "PK", "is not a readable npz archive"),
     ],
 )
 def test_a_damaged_file_is_named(copied, damaged, text, fault):

@@ -39,10 +39,6 @@ COMPARED_PREDICTIONS = [
     if folder in PREDICTED
     for seed in SEEDS
 ]
-# Sources whose first registrations the page shows in 3-D -> the form of GP-CA that explains them there.
-SAMPLED = {source: NAMES["gpca"] for source in SOURCES if NAMES["gpca"]}
-SAMPLED |= {FRAMES: NAMES["first_backbone"]}
-UNCERTAIN = [source for source in SAMPLED if source in SOURCES]
 # Sources whose first failures the page shows with their measured causes.
 MEASURED = SOURCES if NAMES["cause_explainer"] else []
 # What the page says first comes from these; where all objects of the run are stand-ins, the verdicts are those of the
@@ -98,17 +94,6 @@ rule page:
         found=[f"<results>/{name}" for name in FOUND],
         reference=[relpath(REFERENCE)] if REFERENCE.is_file() else [],
         results=[f"<results>/{file}" for result in RESULTS for file in result.all_files],
-        registrations=collect(
-            f"<results>/registrations/{{source}}/seed{SEEDS[0]}.npz", source=SAMPLED
-        ),
-        predictions=[
-            f"<results>/predictions/{source}/{explainer}/seed{SEEDS[0]}.csv"
-            for source, explainer in SAMPLED.items()
-        ],
-        uncertainty=collect(
-            f"<results>/uncertainty/{{source}}/causal/seed{SEEDS[0]}.csv",
-            source=UNCERTAIN,
-        ),
         objects=collect("<results>/objects/{source}.npz", source=MEASURED),
         causes=collect(
             f"<results>/causes/{{source}}/seed{SEEDS[0]}.npz", source=MEASURED
@@ -130,8 +115,6 @@ rule page:
             (result.name, result.kind, result.section, result.title, result.caption)
             for result in RESULTS
         ],
-        samples=list(SAMPLED),
-        uncertain=UNCERTAIN,
         measured=MEASURED,
         titles={
             "explainers": {

@@ -1,4 +1,4 @@
-"""What was found, every table and figure, the comparison and some registrations -> index.html, and the RO-Crate."""
+"""What was found, every table and figure, the comparison and some failures -> index.html, and the RO-Crate."""
 
 from pathlib import Path
 
@@ -9,14 +9,6 @@ from gpca.page.page import FinishedRun, Shown, write_page
 
 with workflow_script(snakemake):
     given, files = snakemake.params, snakemake.input
-    samples = {
-        source: {"registrations": registrations, "predictions": predictions}
-        for source, registrations, predictions in zip(
-            given.samples, files.registrations, files.predictions, strict=True
-        )
-    }
-    for source, uncertainty in zip(given.uncertain, files.uncertainty, strict=True):
-        samples[source]["uncertainty"] = uncertainty
     causes = {
         source: {"objects": objects, "causes": causes}
         for source, objects, causes in zip(given.measured, files.objects, files.causes, strict=True)
@@ -26,7 +18,6 @@ with workflow_script(snakemake):
         seeds=given.config["seeds"],
         sources=given.sources,
         results=[Shown(*fields) for fields in given.shown],
-        samples=samples,
         causes=causes,
         titles=Titles(**given.titles),
         reference=next(iter(files.reference), None),

@@ -39,8 +39,7 @@ function showRegistrations() {
   const groups = new Map();
   samples.forEach((sample, index) => {
     const { title, stand_in: standIn } = sample.source;
-    const measured = sample.shares ? ": failed, with measured causes" : "";
-    const name = `${title}${standIn ? " (procedural stand-in)" : ""}${measured}`;
+    const name = `${title}${standIn ? " (procedural stand-in)" : ""}`;
     if (!groups.has(name)) {
       const group = document.createElement("optgroup");
       group.label = name;
@@ -61,40 +60,6 @@ function showRegistrations() {
     return [
       element("h3", "", sample.object),
       element("p", "footnote", title + (standIn ? ", procedural stand-in" : "")),
-    ];
-  }
-
-  // What GP-CA says of a perturbed registration.
-  function scores(sample) {
-    const named = sample.predicted === "" ? "names no concept" : `names ${sample.predicted}`;
-    const verdict = sample.predicted === sample.concept ? ["right", "good"] : ["wrong", "bad"];
-    const said = element("p", "", `GP-CA ${named}: `);
-    said.append(element("span", `verdict ${verdict[1]}`, verdict[0]));
-    const rows = sample.scores.map(({ concept, mean, deviation }) => {
-      const row = element("div", concept === sample.concept ? "score true" : "score");
-      const bar = element("div", "bar");
-      if (mean !== null) {
-        bar.appendChild(document.createElement("i")).style.width = `${100 * mean}%`;
-      }
-      if (mean !== null && deviation !== null) {
-        const [from, to] = [Math.max(0, mean - deviation), Math.min(1, mean + deviation)];
-        const whisker = bar.appendChild(document.createElement("b"));
-        whisker.style.left = `${100 * from}%`;
-        whisker.style.width = `${100 * (to - from)}%`;
-      }
-      const number = mean === null ? "–" : mean.toFixed(2) + (deviation === null ? "" : ` ± ${deviation.toFixed(2)}`);
-      row.append(element("span", "", concept), bar, element("span", "", number));
-      return row;
-    });
-    return [
-      element("p", "", `True cause: ${sample.concept} (${sample.severity})`),
-      said,
-      ...rows,
-      element("p", "footnote", `Mean of the posterior draws ± their standard deviation; the true cause is bold. `
-        + `ICP ends ${sample.error_percent.toFixed(1)} % of the diameter off (ADD-S: ${sample.state}); `
-        + `its fitness is ${sample.fitness}`
-        + (sample.uncertainty === null ? "." : `, its uncertainty u ${sample.uncertainty.toFixed(1)} nats `
-          + `(of 95 % of the clean pairs: at most ${sample.clean_uncertainty.toFixed(1)}).`)),
     ];
   }
 
@@ -135,8 +100,7 @@ function showRegistrations() {
 
   function show() {
     const sample = samples[chosen.value];
-    const facts = sample.shares ? measured(sample) : scores(sample);
-    document.getElementById("scores").replaceChildren(...head(sample), ...facts);
+    document.getElementById("scores").replaceChildren(...head(sample), ...measured(sample));
     view.load(sample.scene);
     chosen.dataset.shown = chosen.value;
   }
