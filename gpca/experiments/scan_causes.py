@@ -39,7 +39,7 @@ from gpca.reenactment.settings import ReenactmentSettings
 from gpca.scans.scene import stratum_of
 from gpca.seeds import generator, seed_of_file
 from gpca.settings import Distinct, changes_of, fields_of
-from gpca.steps.scan_trials import TrialSettings
+from gpca.steps.scans import TrialSettings
 
 Learned = Distinct[Literal["objects", "scans"]]
 

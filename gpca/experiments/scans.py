@@ -30,7 +30,7 @@ from gpca.scans.scene import stratum_name, stratum_of
 from gpca.scans.source import ScanEntry, data_files, entry_of, place_of
 from gpca.settings import Bounds, Count, Share, fields_of, read_settings
 from gpca.steps.registration_trials import INITIAL
-from gpca.steps.scan_trials import TrialSettings
+from gpca.steps.scans import TrialSettings
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,7 +145,7 @@ DRAW = Step(
 )
 REGISTER = Step(
     name="register_scans",
-    run="gpca.steps.scan_trials",
+    run="gpca.steps.scans:register",
     inputs={"scans": "scans/{source}/seed{seed}.npz"},
     outputs={
         "rows": "scan_trials/{source}/{*method}/seed{seed}.csv",

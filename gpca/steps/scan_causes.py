@@ -30,8 +30,7 @@ from gpca.scans.scene import ScanPairs
 from gpca.seeds import generator
 from gpca.settings import fields_of, read_settings
 from gpca.steps.diagnosis import DESCRIBED, World, with_what_it_reads
-from gpca.steps.scan_trials import TrialSettings, pair_to_register
-from gpca.steps.scans import drawn_pairs
+from gpca.steps.scans import TrialSettings, drawn_pairs, pair_to_register
 
 GlobalMethod = Callable[[ScanPair], np.ndarray | None]  # returns T_target_source (4×4), meters; None where it fails
 

@@ -37,7 +37,7 @@ MODULES = {  # modules with a function ``run``
     "recover": "gpca.steps.recovery",
     "register_methods": "gpca.steps.registration_trials",
     "repair_verdicts": "gpca.steps.repair_verdicts",
-    "register_scans": "gpca.steps.scan_trials",
+    "register_scans": "gpca.steps.scans:register",
 }
 for module, steps in STEPS.items():
     for step in steps.split():

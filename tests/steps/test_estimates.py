@@ -12,10 +12,10 @@ from gpca.pairs.judge import Judges
 from gpca.rigid import exp, inverse
 from gpca.steps.estimates import (
     DrawnCauses,
+    Reference,
     compared,
     try_estimators,
 )
-from gpca.steps.references import Reference
 from gpca.uncertainty.estimates import COVARIANCE, KINDS, MILLI, REFERENCES, SIXTH, EstimatorPairSettings
 from gpca.uncertainty.spread import divergence
 from tests.conftest import FEW_CAUSES

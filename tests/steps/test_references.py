@@ -10,7 +10,7 @@ from gpca.alignment.methods.registry import make_method
 from gpca.causes.candidate import draw_candidate
 from gpca.causes.settings import CauseSettings
 from gpca.rigid import exp, transform
-from gpca.steps.references import Redraws, draw_twists
+from gpca.steps.estimates import Redraws, draw_twists
 from gpca.uncertainty.estimators.interface import RegisteredPair
 
 SETTINGS = CauseSettings(points=(256, 512))

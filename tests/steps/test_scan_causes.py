@@ -18,7 +18,7 @@ from gpca.scans.pair import Rung
 from gpca.scans.scene import ScanPairs
 from gpca.steps import diagnosis as diagnoses
 from gpca.steps.scan_causes import diagnose, folds_of, global_method, measure, starts_of
-from gpca.steps.scan_trials import TrialSettings
+from gpca.steps.scans import TrialSettings
 from tests.scans.corner import corner_pair
 from tests.steps.test_guarantee import write_measurements
 

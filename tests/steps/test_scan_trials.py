@@ -9,7 +9,7 @@ from gpca.alignment.methods import registry
 from gpca.alignment.methods.interface import FailedRegistration, MethodEntry, Outcome
 from gpca.scans.pair import Rung, rungs_of
 from gpca.scans.scene import ScanPairs
-from gpca.steps.scan_trials import TrialSettings, errors_of, pair_to_register, scan_normals, try_methods
+from gpca.steps.scans import TrialSettings, errors_of, pair_to_register, scan_normals, try_methods
 from tests.scans.tiny import pair
 
 LADDER = (Rung(0, 0), Rung(20, 0.3))

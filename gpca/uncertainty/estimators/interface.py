@@ -15,6 +15,9 @@ from gpca.alignment.batched_icp import BatchedICP, BatchedPlaneICP
 from gpca.alignment.icp import ICPSettings
 from gpca.alignment.methods.interface import CORRESPONDENCE_DISTANCE, FEWEST, Outcome, Pair
 from gpca.alignment.methods.registry import make_method, method_entry
+from gpca.objects.bop import symmetric_turn
+from gpca.pairs.distances import ObservedPair, describe_distances, describe_entropy
+from gpca.pairs.judge import Judge
 from gpca.rigid import exp, inverse, log, point_jacobians, rigid_motion, transform
 
 SINGULAR = 1e-9  # ratio of eigenvalues below which a direction counts as open
@@ -23,6 +26,7 @@ POINT_TO_POINT, POINT_TO_PLANE = "point_to_point", "point_to_plane"
 # What a covariance is that of: results from other starts, results of clouds measured again, both at once; poses that
 # are likely given these very clouds; or errors, whatever they come from.
 Modeled = Literal["starts", "data", "starts and data", "posterior", "error"]
+Moved = Literal["model", "observed"]  # which cloud the source is
 
 
 class FailedEstimate(Exception):
@@ -172,3 +176,55 @@ def intrinsic_frame(points_N_3: np.ndarray) -> np.ndarray:
     axes_3_3 = axes_3_3 * np.where((along_N_3**3).sum(axis=0) < 0, -1.0, 1.0)
     axes_3_3[:, 2] = np.cross(axes_3_3[:, 0], axes_3_3[:, 1])
     return rigid_motion(axes_3_3, center_3)
+
+
+def describe(pair: Pair, outcome: Outcome, moved: Moved) -> np.ndarray:
+    """Return descriptors (F,) that need no further registration: distances, local planes, entropy."""
+    if moved == "model":
+        observed, model = transform(inverse(outcome.T_target_source), pair.target), pair.source
+    else:
+        observed, model = transform(outcome.T_target_source, pair.source), pair.target
+    shown = ObservedPair(
+        observed=observed,
+        model=model,
+        T_init=np.eye(4),
+        T_runs=np.eye(4)[None],
+        fitness_n=np.array([outcome.fitness]),
+        inlier_rmse_n=np.array([outcome.inlier_rmse]),
+        axes=(),
+    )
+    return np.concatenate([*describe_distances(shown), describe_entropy(shown)])
+
+
+def true_twist(registered: RegisteredPair, T_true: np.ndarray, judge: Judge, moved: Moved) -> np.ndarray:
+    """Return the twist (6,) of the true pose about that of the registration, the symmetric one that is nearest.
+
+    Symmetries are turns of the model: before the pose where the model moves, after it where it is the target.
+    """
+    T_found = registered.T_target_source
+    if moved == "model":
+        turn = rigid_motion(symmetric_turn(T_found[:3, :3].T @ T_true[:3, :3], judge.symmetries))
+        return log((T_true @ turn @ inverse(T_found))[None])[0]
+    turn = rigid_motion(symmetric_turn(T_true[:3, :3] @ T_found[:3, :3].T, judge.symmetries))
+    return log((turn @ T_true @ inverse(T_found))[None])[0]
+
+
+def example(
+    registered: RegisteredPair,
+    T_true: np.ndarray,
+    judge: Judge,
+    moved: Moved,
+    draw: Callable[[], np.ndarray],
+    runs: int,
+) -> Example:
+    """Return a training registration with the results of a few others, as `draw` gives their twists (n, 6) about it.
+
+    Where too few of the `runs` have any result, the twists are zeros, as if all were at the pose.
+    """
+    try:
+        twists_n_6 = draw()
+    except FailedEstimate:
+        twists_n_6 = np.zeros((runs, 6))
+    described = describe(registered.pair, registered.outcome, moved)
+    truth_6 = true_twist(registered, T_true, judge, moved)
+    return Example(described, twists_n_6, truth_6, intrinsic_frame(registered.pair.target))

@@ -15,8 +15,15 @@ from gpca.process.progress import progress
 from gpca.seeds import generator, seed_of
 from gpca.uncertainty.designs import ADDITIVE_KNOBS, RegisteredRow
 from gpca.uncertainty.estimators.analytic import sample
-from gpca.uncertainty.estimators.examples import Moved, describe, example
-from gpca.uncertainty.estimators.interface import POINT_TO_POINT, CovarianceEstimate, Example, RegisteredPair
+from gpca.uncertainty.estimators.interface import (
+    POINT_TO_POINT,
+    CovarianceEstimate,
+    Example,
+    Moved,
+    RegisteredPair,
+    describe,
+    example,
+)
 from gpca.uncertainty.interventions import UNTOUCHED, KnobbedSource, Knobs
 from gpca.uncertainty.settings import UncertaintySettings
 from gpca.uncertainty.spread import divergence
