@@ -128,7 +128,7 @@ JOIN = Step(
 )
 RETRAIN = Step(
     name="retrain",
-    run="gpca.steps.readings.severities:retrain",
+    run="gpca.steps.readings.subsets:retrain",
     inputs={"objects": "objects/{source}.npz"},
     outputs={"out": "retrained/{severities}/{source}/seed{seed}.npz"},
     where={"source": "retrained_source"},

@@ -31,10 +31,9 @@ from gpca.pairs.synthesis import RegistrationSettings, make_registrations
 from gpca.process.progress import progress
 from gpca.seeds import seed_of_file
 from gpca.steps.readings.files import RunFiles, accuracies, diagnostics_of_scores, like_the_training, train_and_test
-from gpca.steps.readings.gpc_start import FITTED, StartedGPC, relevant, to_unit_norm
 from gpca.steps.readings.knobs import accuracies_of_magnitudes, runs_of
 from gpca.steps.readings.labels import NEW, passes_to
-from gpca.steps.readings.learners import FOREST, SVM, svm_scores
+from gpca.steps.readings.learners import FITTED, FOREST, SVM, StartedGPC, relevant, svm_scores, to_unit_norm
 from gpca.uncertainty.interventions import MIDDLE, UPPER
 from gpca.uncertainty.settings import UncertaintySettings
 

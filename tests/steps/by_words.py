@@ -23,7 +23,7 @@ STEPS = {  # module of gpca.steps -> the steps that it has, functions of their n
     "learning_curve": "learning_curve=learn_from_more learning_samples",
     "pairs": "objects registrations uncertainty train embed reduce attribute",
     "readings.files": "readings=run join_repeats=join",
-    "readings.severities": "retrain",
+    "readings.subsets": "retrain",
     "repair": "attempt",
     "scan_causes": "scan_causes=measure diagnose_scans=diagnose",
     "scans": "draw_scans",

@@ -13,7 +13,7 @@ from gpca.classifier.scores import Attribution
 from gpca.classifier.settings import GPCSettings
 from gpca.explainers.registry import explainer_entry
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.steps.readings import frames, gpc_start, labels, learners, severities
+from gpca.steps.readings import labels, learners, subsets
 from gpca.steps.readings.files import accuracies
 from gpca.steps.readings.groups import ReadingSizes
 from tests.steps.readings.conftest import SECTIONS, rows_of
@@ -32,7 +32,7 @@ def test_the_protocols_start_is_the_classifiers_own_and_others_are_not(halves):
     expected = GPC(CONCEPTS, settings, "tiny", 0).fit(train.embedding, train.concept).attribute(test.embedding)[0]
 
     def scores(**choice):
-        gpc = gpc_start.StartedGPC(settings, PROTOCOL | choice, "tiny", 0)
+        gpc = learners.StartedGPC(settings, PROTOCOL | choice, "tiny", 0)
         return gpc.fit(train.embedding, train.concept).attribute(test.embedding)[0]
 
     np.testing.assert_array_equal(scores(), expected)
@@ -41,16 +41,16 @@ def test_the_protocols_start_is_the_classifiers_own_and_others_are_not(halves):
         *({"inducing": "random"}, {"lengthscale": "default"}, {"batch": "minibatch"}),
     ):
         assert np.abs(scores(**choice) - expected).max() > 1e-3
-    np.testing.assert_allclose(np.linalg.norm(gpc_start.to_unit_norm(test.embedding), axis=1), 1, rtol=1e-5)
-    assert not gpc_start.to_unit_norm(np.zeros((1, 3))).any()
+    np.testing.assert_allclose(np.linalg.norm(learners.to_unit_norm(test.embedding), axis=1), 1, rtol=1e-5)
+    assert not learners.to_unit_norm(np.zeros((1, 3))).any()
 
 
 def test_starts_touch_the_small_rate_and_table_v(run_files):
     settings = SECTIONS | {"gpca_paper": SECTIONS["gpca_paper"] | {"inducing": 4}}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(gpc_start, "FITTED", (("polynomial", 0.001, 2), ("rbf", 0.01, 2), ("matern32", 0.01, 2)))
-        patch.setattr(gpc_start, "SHOWN_AS", {("rbf", 0.01, 2): "gpca_paper", ("matern32", 0.01, 2): "gpca_matern"})
-        found = rows_of(gpc_start.starts, replace(run_files, settings=settings), {k: [v] for k, v in PROTOCOL.items()})
+        patch.setattr(learners, "FITTED", (("polynomial", 0.001, 2), ("rbf", 0.01, 2), ("matern32", 0.01, 2)))
+        patch.setattr(learners, "SHOWN_AS", {("rbf", 0.01, 2): "gpca_paper", ("matern32", 0.01, 2): "gpca_matern"})
+        found = rows_of(learners.starts, replace(run_files, settings=settings), {k: [v] for k, v in PROTOCOL.items()})
     methods = {(method, metric) for _, method, metric, concept in found if concept == "all"}
     assert {("polynomial-0.001-2", "accuracy"), ("gpca_paper", "accuracy"), ("gpca_matern", "ece")} <= methods
 
@@ -111,14 +111,14 @@ def test_diagnostics_follow_set_score_and_area(run_files, halves, tmp_path):
 
 def test_severities_come_in_thirds_of_each_concept(run_files, halves):
     _, test = halves
-    part_S = severities.third_S(test)
+    part_S = subsets.third_S(test)
     for concept in CONCEPTS:
         names, counts = np.unique(part_S[test.concept == concept], return_counts=True)
         assert dict(zip(names, counts, strict=True)) == {"weakest": 2, "middle": 2, "strongest": 2}
     crop_S = test.severity_crop
     overlap = test.concept == "overlap"
     assert crop_S[overlap & (part_S == "weakest")].max() < crop_S[overlap & (part_S == "strongest")].min()
-    found = rows_of(severities.thirds, run_files, {"part": ["all", "weakest"], "classifier": ["paper", "converged"]})
+    found = rows_of(subsets.thirds, run_files, {"part": ["all", "weakest"], "classifier": ["paper", "converged"]})
     assert found[("all", "paper"), "gpca_paper", "accuracy", "all"] == pytest.approx(15 / 18)
     assert {reading[1] for reading, *_ in found} == {"paper"}  # there are no predictions of the other
 
@@ -156,9 +156,9 @@ def test_repeats_on_frames_vary_in_what_they_say(run_files, embedded, tmp_path):
     predictions = {("tiny", "dgcnn-none", seed): run_files.predictions["tiny", "gpca_paper", 0] for seed in range(3)}
     shown = replace(run_files, registrations=five, predictions=predictions)
     readings = [{"repeats": repeats, "objects": "all"} for repeats in ("everything", "classifiers", "samples")]
-    rows = list(frames.repeats(shown, readings))
+    rows = list(subsets.repeats(shown, readings))
     # A job for each kind of repeat gives the same.
-    assert [row for reading in readings for row in frames.repeats(shown, [reading])] == rows
+    assert [row for reading in readings for row in subsets.repeats(shown, [reading])] == rows
     assert [row[3] for row in rows] == [0, 1, 2] * 3
     assert {row[4]["accuracy", "all"] for row in rows[:3]} == {15 / 18}
 
@@ -214,7 +214,7 @@ def over_all(found):
 
 def test_an_encoder_as_published_stands_in_the_place_of_the_judged_one(frame_files):
     found = over_all(
-        rows_of(frames.other_rows, frame_files, {"architecture": ["judged", "published"], "objects": OBJECTS})
+        rows_of(subsets.other_rows, frame_files, {"architecture": ["judged", "published"], "objects": OBJECTS})
     )
     assert found[("judged", "all"), "dgcnn-none"] == pytest.approx(15 / 18)
     assert found[("published", "all"), "dgcnn-none"] == 1
@@ -224,7 +224,7 @@ def test_an_encoder_as_published_stands_in_the_place_of_the_judged_one(frame_fil
 
 def test_the_same_rows_from_estimators_poses(frame_files):
     choices = {"initial_pose": ["true_pose", "estimated"], "objects": ["all"]}
-    found = over_all(rows_of(frames.other_rows, frame_files, choices))
+    found = over_all(rows_of(subsets.other_rows, frame_files, choices))
     assert found[("true_pose", "all"), "dgcnn-none"] == pytest.approx(15 / 18)
     assert found[("estimated", "all"), "dgcnn-none"] == pytest.approx(1 / 3)
     assert found[("true_pose", "all"), "pointnext-none"] == pytest.approx(15 / 18)
