@@ -181,7 +181,8 @@ def details(explained: Mapping, names: Mapping[str, str], pose_rows: Sequence[st
     listed = "".join(f"<dt>{escape(name)}</dt><dd>{escape(str(value))}</dd>" for name, value in rows.items())
     matrix = "\n".join(pose_rows)
     notes = "".join(f"<li>{escape(note)}</li>" for note in explained["notes"])
-    body = f"<dl>{listed}</dl><p>T_target_source</p><pre>{matrix}</pre>" + (f"<ul>{notes}</ul>" if notes else "")
+    body = f'<dl>{listed}</dl><p>T_target_source</p><pre tabindex="0">{matrix}</pre>'
+    body += f"<ul>{notes}</ul>" if notes else ""
     return section("Details", body)
 
 
