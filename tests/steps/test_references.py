@@ -73,15 +73,6 @@ def test_noise_and_outliers_are_as_strong_as_before(surface):
     assert np.array(after) == pytest.approx(before, rel=0.4)
 
 
-def test_each_of_sampling_noise_and_outliers_has_numbers_of_its_own(surface):
-    """What is not noisy shows the same points as what is, drawn by the same axes."""
-    noisy, clean = redraws_of(surface, True, False, False), redraws_of(surface, False, False, False)
-    (source_1, target_1), (source_2, target_2) = (next(each.clouds("a")) for each in (noisy, clean))
-    assert np.array_equal(source_1, source_2)
-    assert np.median(np.abs(target_1 - target_2)) < 3 * noisy.candidate.severity["noise"]
-    assert not np.array_equal(next(noisy.clouds("b"))[0], source_1)
-
-
 @pytest.mark.parametrize("method", ["point_to_point", "point_to_plane", "trimmed"])
 def test_what_is_determined_hardly_varies_with_the_data(surface, method):
     redraws = redraws_of(surface, False, False, False)

@@ -50,14 +50,6 @@ def shifted(objects, embedded):
     return make_sets(objects, registrations, registrations, embed_own, "tiny", 0, SETTINGS)
 
 
-def test_settings_join_what_the_sections_say():
-    assert SETTINGS.beyond.train == 0
-    assert SETTINGS.beyond.test == SETTINGS.samples == 6
-    assert SETTINGS.beyond.cloud_points == 256
-    assert SETTINGS.beyond.severities.crop == (0.6, 0.8)
-    assert SETTINGS.encoder == EncoderSettings(**ENCODER | {"epochs": 2})
-
-
 def test_all_sets_are_there_and_of_the_declared_size(shifted, embedded):
     _, registrations = embedded
     assert set(shifted.set) == set(TRAINED_ON)

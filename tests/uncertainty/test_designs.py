@@ -32,13 +32,6 @@ def evaluated(registrations):
     return {design: {int(row): outcomes(design, registrations, row) for row in rows} for design in designs.DESIGNS}
 
 
-def test_corner_bits_are_switches():
-    assert CORNERS[0] == (False, False, False) and CORNERS[7] == (True, True, True)
-    assert CORNERS[1] == (True, False, False) and CORNERS[4] == (False, False, True)
-    for corner, switches in enumerate(CORNERS):
-        assert sum(on << i for i, on in enumerate(switches)) == corner
-
-
 def test_the_names_of_the_corners_are_what_is_switched_on():
     knobs = ("untouched", "noise", "pose", "noise+pose", "overlap", "noise+overlap", "pose+overlap")
     knobs += ("noise+pose+overlap",)
