@@ -17,8 +17,7 @@ from gpca.reenactment.dataset import Reenactments
 from gpca.scans.pair import Rung
 from gpca.scans.scene import ScanPairs
 from gpca.steps import diagnosis as diagnoses
-from gpca.steps.scan_causes import diagnose, folds_of, global_method, measure, starts_of
-from gpca.steps.scans import TrialSettings
+from gpca.steps.scan_causes import diagnose, folds_of, measure, starts_of
 from tests.scans.corner import corner_pair
 from tests.steps.test_guarantee import write_measurements
 
@@ -91,11 +90,6 @@ def test_what_is_measured_described_and_re_enacted_is_of_the_same_samples(tmp_pa
     before = [path.read_bytes() for path in written]
     measure(job)
     assert [path.read_bytes() for path in written] == before
-
-
-def test_the_global_method_starts_where_it_ends_and_not_where_it_fails(pairs):
-    settings = TrialSettings(points=200, global_start="fgr")
-    assert global_method(settings, {"fgr": {}}, *AXES)(pairs[2]).shape == (4, 4)
 
 
 EXPLAINERS = {"chance": ["scans"], "pair_forest": ["objects", "scans"], "gate_rmse": ["scans"], "reenact": ["scans"]}
