@@ -33,20 +33,6 @@ def upper_bound(value_N: np.ndarray, level: float, family_N: np.ndarray | None =
     return float(value_N[order][enough_N.argmax()]) if enough_N.any() else inf
 
 
-def confident_upper_bound(value_N: np.ndarray, level: float, confidence: float) -> float:
-    """Return a bound that at least the share `level` of new samples does not exceed, with this confidence.
-
-    :func:`upper_bound` holds on average over draws of the calibration samples; this bound holds for the given ones,
-    except for the share 1 - `confidence` of draws. It is the smallest of the sorted values above which the upper
-    Clopper-Pearson bound of the share is at most 1 - `level`; samples have to be independent.
-    """
-    from scipy.stats import binom
-
-    above_N = np.arange(len(value_N))  # number of values above the largest, the second largest, ...
-    sure = int((binom.cdf(above_N, len(value_N), 1 - level) <= 1 - confidence + ROUNDING).sum())
-    return float(np.sort(value_N)[-sure]) if sure else inf
-
-
 def highest_level(family_N: np.ndarray) -> float:
     """Return the largest level with a finite :func:`upper_bound` by K families, K / (K + 1)."""
     return (count := len(np.unique(family_N))) / (count + 1)
@@ -93,16 +79,12 @@ def calibrate_sets(
 
 @dataclass(frozen=True)
 class FailureAlarm:
-    """An alarm with two thresholds, infinite where there were too few samples; between them, it is not sure.
-
-    With a confidence, both risks hold for these thresholds; without, on average over draws of the calibration samples.
-    """
+    """An alarm with two thresholds, infinite where there were too few samples; between them, it is not sure."""
 
     missed: float  # largest probability that a failed registration is called good
     false_alarms: float  # largest probability that a good one is called failed
     good_below: float  # score of failure below which a registration is called good
     failed_from: float  # score from which it is called failed
-    confidence: float | None = None
 
     def of(self, failure_M: np.ndarray) -> np.ndarray:
         """Return the call of each registration, one of `OUTCOMES`, by its score of failure."""
@@ -116,33 +98,26 @@ def calibrate_alarm(
     family_N: np.ndarray | None = None,
     missed: float = 0.05,
     false_alarms: float = 0.05,
-    confidence: float | None = None,
 ) -> FailureAlarm:
     """Calibrate an alarm with these largest risks.
 
     A failure is missed with at most the probability that its score lies below the bound that failures seldom fall below
     (conformal risk control, Angelopoulos et al. 2024, of a loss of 0 or 1); false alarms likewise. If the bounds leave
-    a gap in which both calls are allowed, its middle becomes the only threshold. With a `confidence`,
-    :func:`confident_upper_bound` takes the place of :func:`upper_bound`. No sample may have been used for training.
+    a gap in which both calls are allowed, its middle becomes the only threshold. No sample may have been used for
+    training.
     """
     require_share("risk of missed failures", missed)
     require_share("risk of false alarms", false_alarms)
     require_failures(failure_N)
-    if confidence is not None:
-        require_share("confidence of the alarm", confidence)
-        if family_N is not None:
-            raise InputError("confidence of the alarm", "is for single samples", "leave out either it or the families")
 
     def bound(value_N: np.ndarray, mask_N: np.ndarray, risk: float) -> float:
-        if confidence is not None:
-            return confident_upper_bound(value_N[mask_N], 1 - risk, confidence)
         return upper_bound(value_N[mask_N], 1 - risk, None if family_N is None else family_N[mask_N])
 
     good_below = -bound(-failure_N, failed_N, missed)
     failed_from = float(np.nextafter(bound(failure_N, ~failed_N, false_alarms), inf))
     if good_below > failed_from:
         good_below = failed_from = (good_below + failed_from) / 2
-    return FailureAlarm(missed, false_alarms, good_below, failed_from, confidence)
+    return FailureAlarm(missed, false_alarms, good_below, failed_from)
 
 
 def require_share(name: str, share: float) -> None:

@@ -142,7 +142,6 @@ CALIBRATED = {
     asked_for.PLAIN: "None: scores as they are",
     asked_for.BY_SAMPLE: "By sample",
     asked_for.BY_STATE: "By sample, each state",
-    asked_for.CONFIDENT: "By sample, with confidence",
     asked_for.BY_FAMILY: "By family",
 }
 WORST = "worst_state"
@@ -190,8 +189,8 @@ def table19_guarantee(run: Run, measured):
     heads = {"explainer": "Explainer", "calibrated": "Calibrated"}
     rows = crossed(("method", _titles(run)), ("variant", CALIBRATED))
     sheet = Sheet("table19_guarantee", heads, rows, COLUMNS_OF_ALL, _with_counts(pooled))
-    names = ("level", "missed", "false_alarms", "family_risk", "confidence")
-    level, missed, false_alarms, family_risk, confidence = (f"{100 * run.config[NAME][name]:g}" for name in names)
+    names = ("level", "missed", "false_alarms", "family_risk")
+    level, missed, false_alarms, family_risk = (f"{100 * run.config[NAME][name]:g}" for name in names)
     return sheet.table(
         "Sets of states that hold the true one, and an alarm with bounded errors, on families of shapes that nothing "
         "was trained or calibrated on" + (STAND_INS if run.stand_ins() else ""),
@@ -199,8 +198,7 @@ def table19_guarantee(run: Run, measured):
         [
             f"Guaranteed: sets that hold the state in {level} % of the cases (Coverage); at most {missed} % of the "
             f"failed called good (Missed failures) and {false_alarms} % of the nominal called failed (False alarms), "
-            f"by family {family_risk} % each. With confidence: the two risks hold for these very thresholds, in "
-            f"{confidence} % of the draws of the samples that they were set on.",
+            f"by family {family_risk} % each.",
             "States: nominal, one cause, or several. None: the most probable states until their scores add up to the "
             "guaranteed share, and one threshold that misses as many of the failed in training as is guaranteed, or "
             "0.5 where nothing is trained. By sample: the guarantee holds if single samples are exchangeable. By "
@@ -259,13 +257,12 @@ def guarantee(run: Run, measured):
     from matplotlib.lines import Line2D
 
     from gpca.reporting.figures.panels import in_lines, legend_below, panels
-    from gpca.reporting.figures.style import BLUE, COLUMN_WIDTH_IN, GRAY, GREEN, ORANGE, PURPLE, SMALL_PT, VERMILION
+    from gpca.reporting.figures.style import BLUE, COLUMN_WIDTH_IN, GRAY, GREEN, PURPLE, SMALL_PT, VERMILION
 
     looks = {  # variant -> label, color, marker
         asked_for.PLAIN: ("not calibrated", VERMILION, "x"),
         asked_for.BY_SAMPLE: ("by sample", BLUE, "o"),
         asked_for.BY_STATE: ("by sample, each state", PURPLE, "s"),
-        asked_for.CONFIDENT: ("by sample, with confidence", ORANGE, "D"),
         asked_for.BY_FAMILY: ("by family", GREEN, "^"),
     }
     limits = {name: 100 * run.config[NAME][name] for name in ("level", "missed", "false_alarms", "family_risk")}

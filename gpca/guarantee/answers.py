@@ -29,10 +29,10 @@ SCORES = tuple(f"score_{label}" for label in LABELS)
 TEXTS = ("model", "source", "sample", "family", "state")
 NUMBERS = ("seed", "taught", "severity", "weight")  # columns
 FAMILIES = "families"  # the condition under which the guarantee holds
-VARIANTS = ("plain", "by_sample", "by_state", "confident", "by_family")
-PLAIN, BY_SAMPLE, BY_STATE, CONFIDENT, BY_FAMILY = VARIANTS
+VARIANTS = ("plain", "by_sample", "by_state", "by_family")
+PLAIN, BY_SAMPLE, BY_STATE, BY_FAMILY = VARIANTS
 WITH_SETS = (PLAIN, BY_SAMPLE, BY_STATE, BY_FAMILY)
-WITH_ALARM = (PLAIN, BY_SAMPLE, CONFIDENT, BY_FAMILY)
+WITH_ALARM = (PLAIN, BY_SAMPLE, BY_FAMILY)
 SHIFTED = (BY_SAMPLE, BY_STATE)  # variants under shift
 COVERAGE, SIZE, SINGLE = ("coverage", "set_size", "single_state")
 MISSED, FALSE_ALARMS, UNSURE = RISKS = ("missed_failures", "false_alarms", "not_sure")
@@ -49,7 +49,6 @@ class GuaranteeSettings:
     missed: OpenShare = 0.05  # largest probability that a failed registration is called good
     false_alarms: OpenShare = 0.05  # largest probability that a good registration is called failed
     family_risk: OpenShare = 0.1  # both for calibration by family; there are too few families for a smaller one
-    confidence: OpenShare = 0.9  # with which both hold for the thresholds themselves, in a row of its own
 
 
 @dataclass(frozen=True)
@@ -153,7 +152,6 @@ def answers_of(scored: Scored, condition: Condition, settings: GuaranteeSettings
             made = {
                 BY_SAMPLE: partial(calibrate, *samples, **limits),
                 BY_STATE: partial(calibrate, *samples, **limits, by_state=True),
-                CONFIDENT: partial(calibrate, *samples, **limits, confidence=settings.confidence),
                 BY_FAMILY: partial(calibrate, *samples, families, **limits | risks),
             }
             guarantees = {name: make() for name, make in made.items() if name in condition.variants}

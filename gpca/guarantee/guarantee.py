@@ -70,7 +70,8 @@ class Guarantee:
     def from_dict(cls, plain: Mapping[str, Any]) -> Guarantee:
         """Invert :meth:`to_dict`, also of files that name the kind of sets; an InputError for wrong values."""
         try:
-            sets, alarm = dict(plain["sets"]), plain["alarm"]
+            sets, alarm = dict(plain["sets"]), dict(plain["alarm"])
+            alarm.pop("confidence", None)
             if (kind := sets.pop("nonconformity", "probability")) != "probability":
                 raise ValueError(f"sets by {str(kind)[:40]}")
             limits = tuple(inf if x is None else float(x) for x in sets["limits"])
@@ -95,7 +96,6 @@ def calibrate(
     missed: float = 0.05,
     false_alarms: float = 0.05,
     by_state: bool = False,
-    confidence: float | None = None,
 ) -> Guarantee:
     """Calibrate the guarantee for a new sample on samples that were not used for training.
 
@@ -112,7 +112,7 @@ def calibrate(
     scores_n_K, state_n = np.asarray(scores_N_K, float)[clear_N], state_N[clear_N]
     sets = conformal.calibrate_sets(scores_n_K, state_n, family_n, states, level, by_state)
     failed_n = state_n != states[0]
-    alarm = conformal.calibrate_alarm(1 - scores_n_K[:, 0], failed_n, family_n, missed, false_alarms, confidence)
+    alarm = conformal.calibrate_alarm(1 - scores_n_K[:, 0], failed_n, family_n, missed, false_alarms)
     return Guarantee(sets, alarm, len(state_n), 0 if family_n is None else len(np.unique(family_n)))
 
 

@@ -106,16 +106,6 @@ def act_at_random(means: Means) -> Decide:
     return decide
 
 
-def act_in_turn(means: Means) -> Decide:
-    """Take all actions in turn, in a random order for each case."""
-
-    def decide(case: Case) -> Decision:
-        order = case.random.permutation(len(means.actions))
-        return Decision(means.actions[order[len(case.actions) % len(order)]], "", "in turn")
-
-    return decide
-
-
 def follow_reenactment(means: Means) -> Decide:
     """Treat the cause with the largest effect in the re-enactment; each action repeats only after all others."""
     treatments = means.policy.treatments
@@ -233,7 +223,6 @@ POLICIES = {
     "shap_removal": PolicyEntry("SHAP, remedies, residual", never_queue, explainer="shap_removal_residual"),
     "softmax_head": PolicyEntry("Softmax head", never_queue, explainer="softmax_head"),
     "random": PolicyEntry("Random action", act_at_random),
-    "round_robin": PolicyEntry("Round robin", act_in_turn),
     "oracle": PolicyEntry("Oracle cause", follow_truth, oracle=True),
     "repair_gpca": PolicyEntry("Repair, then GP-CA, never queued", repairing(never_queue), explainer="gpca"),
     "repair_oracle": PolicyEntry("Repair, then oracle cause", repairing(follow_truth), oracle=True),

@@ -4,11 +4,10 @@ from math import ceil, inf
 
 import numpy as np
 import pytest
-from scipy.stats import beta
 
 from gpca.errors import InputError
 from gpca.evaluation import conformal
-from gpca.evaluation.conformal import ALARM, GOOD, NOT_SURE, confident_upper_bound, upper_bound
+from gpca.evaluation.conformal import ALARM, GOOD, NOT_SURE, upper_bound
 
 DRAWS = 4000
 
@@ -28,8 +27,6 @@ def test_too_few_samples_or_families_bound_nothing():
     families = np.repeat(np.arange(8), 50)
     assert upper_bound(np.arange(400.0), 0.9, families) == inf and upper_bound(np.empty(0), 0.5) == inf
     assert conformal.highest_level(families) == pytest.approx(8 / 9)
-    assert confident_upper_bound(np.arange(58.0), 0.95, 0.95) == inf
-    assert confident_upper_bound(np.arange(59.0), 0.95, 0.95) == 58
 
 
 def test_the_bound_holds_exactly_as_often_as_promised():
@@ -57,16 +54,6 @@ def test_for_a_new_family_the_bound_by_families_holds_and_that_by_samples_does_n
     deviation = np.std(by_family) / np.sqrt(DRAWS)
     assert np.mean(by_family) >= 0.9 - 4 * deviation
     assert np.mean(by_sample) < 0.9 - 4 * deviation
-
-
-def test_the_confident_bound_holds_for_the_promised_share_of_draws():
-    random = np.random.default_rng(4)
-    samples, level, confidence = 100, 0.95, 0.9
-    covered = np.array([confident_upper_bound(random.random(samples), level, confidence) for _ in range(DRAWS)])
-    ranks = np.arange(1, samples + 1)
-    exact_of_rank = beta.sf(level, ranks, samples + 1 - ranks)  # of an ordered uniform value
-    exact = exact_of_rank[exact_of_rank >= confidence].min()
-    assert np.mean(covered >= level) == pytest.approx(exact, abs=4 * np.sqrt(exact * (1 - exact) / DRAWS))
 
 
 STATES = ("good", "poor", "lost")
@@ -167,18 +154,6 @@ def test_both_risks_are_kept_on_average(shift):
         assert np.mean(risks) <= 0.05 + 4 * np.std(risks) / np.sqrt(400)
 
 
-def test_with_confidence_few_thresholds_break_a_promise():
-    random = np.random.default_rng(6)
-    many, many_failed = alarm_drawn(random, 20000, 2.0)
-    broken = {None: 0, 0.9: 0}
-    for _ in range(300):
-        failure, failed = alarm_drawn(random, 300, 2.0)
-        for confidence in broken:
-            called = conformal.calibrate_alarm(failure, failed, confidence=confidence).of(many)
-            broken[confidence] += (called[many_failed] == GOOD).mean() > 0.05
-    assert broken[0.9] <= 0.1 * 300 + 4 * np.sqrt(0.09 * 300) < broken[None]
-
-
 def test_from_too_few_samples_or_families_it_is_never_sure():
     few = conformal.calibrate_alarm(np.arange(36.0), np.repeat([False, True], 18))
     assert (few.good_below, few.failed_from) == (-inf, inf)
@@ -193,8 +168,6 @@ def test_from_too_few_samples_or_families_it_is_never_sure():
     [
         ({"missed": 0}, "risk of missed failures: 0 is not strictly between 0 and 1"),
         ({"false_alarms": 5}, "risk of false alarms: 5 is not strictly between 0 and 1"),
-        ({"confidence": 1}, "confidence of the alarm: 1 is not strictly between"),
-        ({"confidence": 0.9, "family_N": np.zeros(4)}, "confidence of the alarm: is for single samples; leave out"),
         ({"failure_N": np.full(4, np.nan)}, "scores of failure: are not one finite number for each sample"),
     ],
 )

@@ -14,7 +14,6 @@ from gpca.guarantee import answers as asked
 from gpca.guarantee.answers import (
     BY_FAMILY,
     BY_SAMPLE,
-    CONFIDENT,
     COVERAGE,
     FALSE_ALARMS,
     FAMILIES,
@@ -30,7 +29,7 @@ from tests.config.configs import changed
 from tests.guarantee.scored import scored_samples
 
 SECTION = {
-    **{"level": 0.8, "missed": 0.05, "false_alarms": 0.05, "family_risk": 0.2, "confidence": 0.9},
+    **{"level": 0.8, "missed": 0.05, "false_alarms": 0.05, "family_risk": 0.2},
     **{"explainers": ["reenact"]},
 }
 PROMISED = {name: value for name, value in SECTION.items() if name != "explainers"}
@@ -83,8 +82,8 @@ def test_measures_are_shares_of_the_answers(files, measured):
         assert size == pytest.approx(inside.sum(axis=1).mean(), abs=1e-6)
         several = value(measured, FAMILIES, POOLED, variant, COVERAGE, "several")
         assert several["value"] == pytest.approx(holds[state == "several"].mean(), abs=1e-6)
-    calls = answers.calls[CONFIDENT]
-    missed = value(measured, FAMILIES, POOLED, CONFIDENT, MISSED)
+    calls = answers.calls[BY_SAMPLE]
+    missed = value(measured, FAMILIES, POOLED, BY_SAMPLE, MISSED)
     assert missed["value"] == pytest.approx((calls[state != "nominal"] == "good").mean(), abs=1e-6)
     # Each of 240 samples is asked about by two models.
     assert value(measured, FAMILIES, POOLED, BY_SAMPLE, COVERAGE)["samples"] <= 240 * 3
@@ -122,7 +121,6 @@ def test_the_tables_say_what_was_promised_and_measured(measured):
     covered = value(measured, FAMILIES, POOLED, BY_SAMPLE, COVERAGE)
     numbers = " to ".join(f"{100 * covered[name]:.1f}" for name in ("low", "high"))
     assert f"| {TITLE} | By sample | {100 * covered['value']:.1f} ({numbers})" in text
-    assert f"| {TITLE} | By sample, with confidence | – | – | – | – |" in text
     assert "sets that hold the state in 80 % of the cases" in text and "by family 20 % each" in text
     worst = min(value(measured, FAMILIES, POOLED, PLAIN, COVERAGE, state)["value"] for state in STATES)
     assert table.cells[0, "worst_state"].mean == pytest.approx(100 * worst)

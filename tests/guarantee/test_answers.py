@@ -36,7 +36,7 @@ def test_every_sample_of_a_family_that_a_model_did_not_learn_from_is_answered_on
     assert not scored.seen[answers.row].any()
     assert answers.families == 7  # two thirds of twelve, without the tested one
     assert set(answers.sets) == {module.PLAIN, module.BY_SAMPLE, module.BY_STATE, module.BY_FAMILY}
-    assert set(answers.calls) == {module.PLAIN, module.BY_SAMPLE, module.CONFIDENT, module.BY_FAMILY}
+    assert set(answers.calls) == {module.PLAIN, module.BY_SAMPLE, module.BY_FAMILY}
 
 
 def test_neither_the_tested_family_nor_what_was_learned_from_sets_a_threshold(scored, promised, answers):

@@ -42,14 +42,14 @@ def test_scores_of_states_by_hand():
         state_scores(np.array([[np.nan, 0, 0, 0]]))
 
 
-@pytest.mark.parametrize("choice", [{}, {"by_state": True}, {"confidence": 0.9}])
+@pytest.mark.parametrize("choice", [{}, {"by_state": True}])
 def test_the_plain_form_is_read_back_as_it_was(choice):
     scores, state, family = drawn(np.random.default_rng(7), 400)
-    guarantee = calibrate(scores, state, None if "confidence" in choice else family, **choice)
+    guarantee = calibrate(scores, state, family, **choice)
     plain = json.loads(json.dumps(guarantee.to_dict()))
     assert Guarantee.from_dict(plain) == guarantee
     assert guarantee.sets(scores).shape == scores.shape and set(guarantee.alarm(1 - scores[:, 0])) <= set(OUTCOMES)
-    assert guarantee.samples == 390 and guarantee.families == (0 if "confidence" in choice else 12)
+    assert guarantee.samples == 390 and guarantee.families == 12
 
 
 def test_borderline_samples_are_left_out_and_the_order_does_not_matter():

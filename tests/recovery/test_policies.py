@@ -50,17 +50,6 @@ def test_the_learned_policy_decides_by_what_is_known_and_done_and_leaves_alone_w
     assert made("utility_acting", utility=utility)(case(known=np.zeros(1))).action == "denoise"
 
 
-def test_round_robin_takes_every_action_once_in_an_order_of_the_case():
-    orders = set()
-    for episode in range(12):
-        taken = ()
-        for _ in ACTIONS:
-            taken += (made("round_robin")(case(taken, episode=episode)).action,)
-        assert sorted(taken) == sorted(ACTIONS)
-        orders.add(taken)
-    assert len(orders) > 1
-
-
 class Gate:
     """Takes for failed what has a positive number."""
 
