@@ -1,6 +1,5 @@
 """Table X: accuracy under the controls, and from each source to each other."""
 
-from dataclasses import dataclass
 from math import inf
 from typing import Any
 
@@ -12,14 +11,13 @@ from gpca.errors import InputError
 from gpca.evaluation.intervals import REPEATS
 from gpca.evaluation.measures import ALL, POOLED
 from gpca.experiments.cause_tables import rule_near_chance
-from gpca.experiments.controls import AUROC, CALLS, OF_TRIVIAL, RIVAL, SECTION, USUAL
+from gpca.experiments.controls import CALLS, OF_TRIVIAL, RIVAL, SECTION, USUAL
 from gpca.experiments.explained import titles
 from gpca.explainers.registry import explainer_entry
 from gpca.reporting.figures import style
 from gpca.reporting.figures.style import SMALL_PT
 from gpca.reporting.sheet import Sheet, Show, crossed, show, with_label
 from gpca.reporting.tables.cells import plain_cell, rows_where
-from gpca.reporting.tables.table import Cell
 from gpca.reporting.words import plural, span
 from gpca.steps import control_samples as samples_of
 from gpca.steps.control_samples import HARD, PAPER, TRANSFER, UNSEEN
@@ -37,20 +35,9 @@ TITLES = {
 }
 CHANGE = "_change"  # suffix of a control: the column of differences from the paper's protocol
 DIFFERENCES = {"_gain": (OF_TRIVIAL, "over trivial (points)"), "_lead": (RIVAL, "lead (points)")}
-WRONG = "_wrong"  # suffix of an AUROC: the column of the answers that it has to detect
-AUROCS = {PAPER: "AUROC, paper's", UNSEEN: "AUROC, unseen"}
 BOOTSTRAP = f"the 95 % interval of a bootstrap over objects and seeds ({REPEATS} draws)"
 ALL_TOGETHER = {POOLED: "All together"}
 POINTS = (-100.0, 100.0)
-
-
-@dataclass(frozen=True)
-class Count(Show):
-    """A number of test samples, and their total."""
-
-    def text(self, cell: Cell) -> str:
-        """E.g. ``24 of 1800``."""
-        return f"{cell.mean:.0f} of {cell.test_samples}"
 
 
 @table(
@@ -80,11 +67,6 @@ def table10_controls(run: Run, intervals):
             columns[name + suffix] = accuracy(name, title, against, limits=POINTS)
     number: dict[str, Any] = {"factor": 1, "interval": False}
     columns[CALLS] = show(CALLS, "ICP calls", ALL, {"table": PAPER}, decimals=0, limits=(0, inf), **number)
-    for name, words in AUROCS.items() if UNSEEN in names else ():
-        key = f"{name}_auroc"
-        columns[key] = show(AUROC, words, ALL, {"table": name}, decimals=2, limits=(0, 1), **number)
-        where = columns[name].where
-        columns[key + WRONG] = Count(f"{words}: wrong", 0, False, (0, inf), beside=key, where=where, factor=1)
     rows = with_label(
         crossed(("source", ALL_TOGETHER | run.source_titles), ("method", explainers)),
         lambda row: explainer_entry(row.where["method"]).sight,
@@ -94,11 +76,6 @@ def table10_controls(run: Run, intervals):
     for (i, key), cell in list(sheet.cells.items()):
         if key == CALLS:
             sheet.cells[i, key] = plain_cell(cell.mean, cell.seeds, cell.test_samples)
-        elif key.endswith(WRONG):
-            wrong = round((1 - cell.mean) * cell.test_samples)
-            sheet.cells[i, key] = plain_cell(wrong, cell.seeds, cell.test_samples)
-            if (i, key.removesuffix(WRONG)) not in sheet.cells:
-                del sheet.cells[i, key]
     by_control = {name: [cell.seeds for (_, key), cell in sheet.cells.items() if key == name] for name in names}
     seeds = {name: span(numbers_of_seeds) for name, numbers_of_seeds in by_control.items() if numbers_of_seeds}
     usual = seeds.pop(PAPER, str(sheet.seeds))
@@ -120,9 +97,8 @@ def table10_controls(run: Run, intervals):
         "counterfactuals, and drawn so that ten trivial numbers know nothing of it. What reads no embedding learns "
         "from all sources, but from no family that is tested. Guessing is right in 33.3 %."
         + rule_near_chance(intervals, run.sources, table=HARD, metric="accuracy", against=""),
-        "AUROC: how well the entropy of the scores separates wrong from right answers; in brackets how many of the "
-        "test samples are wrong, and a dash where none is. Elsewhere a dash marks a head that is trained with the "
-        "encoder and learns no labels, and a source that does not admit a control.",
+        "A dash marks a head that is trained with the encoder and learns no labels, and a source that does not admit a "
+        "control.",
     )
     caption = "Accuracy (%) of single-concept attribution with a shortcut closed (change in brackets)" + run.stand_ins()
     return sheet.table(caption, "control", notes, bold=[name for name in names if name != "shuffled"], same=1)

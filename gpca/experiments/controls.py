@@ -178,8 +178,7 @@ EXPLAIN = Step(
 def read_controls(files: Paths) -> Frame:
     """Predictions of files named ``…/{source trained on}/seed{seed}.csv``; `source` is the one that is tested.
 
-    ``cluster`` names the family with its source. An abstained sample is not ``right``. ``bald`` is NaN where there is
-    none.
+    ``cluster`` names the family with its source. An abstained sample is not ``right``.
     """
     import pandas as pd
 
@@ -196,7 +195,6 @@ def read_controls(files: Paths) -> Frame:
                 concept=rows["concept_true"],
                 right=(rows["concept_true"] == rows["concept_predicted"]) & ~rows["abstained"],
                 entropy=number_column(path, rows, "entropy"),
-                bald=number_column(path, rows, "bald", needed=rows["bald"] != ""),
             )
         )
     if not frames:
@@ -204,18 +202,16 @@ def read_controls(files: Paths) -> Frame:
     return pd.concat(frames, ignore_index=True)
 
 
-def auroc_error(rows: Frame, score: str, weights_B_N: np.ndarray) -> np.ndarray:
-    """Area (B,) under the ROC curve by which a score separates wrong from right; NaN where it cannot."""
+def auroc_error(rows: Frame, weights_B_N: np.ndarray) -> np.ndarray:
+    """Area (B,) under the ROC curve by which the entropy separates wrong from right; NaN where it cannot."""
     from gpca.causes.judged import ranking
 
-    if rows[score].isna().any():
-        return np.full(len(weights_B_N), np.nan)
-    return ranking(rows[score].to_numpy(), ~rows["right"].to_numpy(), weights_B_N)["area"]
+    return ranking(rows["entropy"].to_numpy(), ~rows["right"].to_numpy(), weights_B_N)["area"]
 
 
 @numbers("controls.csv", rule="control_metrics", files="controls/{source}/seed{control_seed}.csv")
 def collect(run: Run, files: Paths) -> Frame:
-    """Accuracy, and AUROC of errors by entropy and by BALD, by seed; ``table`` is the control.
+    """Accuracy, and AUROC of errors by entropy, by seed; ``table`` is the control.
 
     ``concept`` is ``all``, and for transfer the source that was trained on.
     """
@@ -224,8 +220,7 @@ def collect(run: Run, files: Paths) -> Frame:
     for (control, source, trained_on, explainer, seed), rows in read_controls(files).groupby(keys, sort=False):
         concept = trained_on if control == TRANSFER else ALL
         values = {"accuracy": rows["right"].mean(), TEST_SAMPLES: len(rows)}
-        for metric, score in ((AUROC, "entropy"), ("auroc_error_bald", "bald")):
-            values[metric] = auroc_error(rows, score, np.ones((1, len(rows))))[0]
+        values[AUROC] = auroc_error(rows, np.ones((1, len(rows))))[0]
         records += [
             (control, source, explainer, metric, concept, seed, float(value))
             for metric, value in values.items()
@@ -278,7 +273,7 @@ def collect_intervals(run: Run, files: Paths) -> Frame:
 def _values(rows: Frame, draws: Clustered) -> Values:
     values = {
         "accuracy": weighted_mean(rows["right"].to_numpy(), draws.weights),
-        AUROC: auroc_error(rows, "entropy", draws.weights),
+        AUROC: auroc_error(rows, draws.weights),
     }
     if (rows["control"] == PAPER).all():
         values[CALLS] = np.full(len(draws.weights), rows[CALLS].mean())
