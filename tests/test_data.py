@@ -91,7 +91,7 @@ def test_an_object_is_in_one_source_and_the_mug_in_ycb_alone():
     assert set(rows.loc[rows["name"].str.contains("mug"), "source"]) == {"ycb"}
 
 
-@pytest.mark.parametrize("config", ["sources.yaml", "development.yaml", "cup_views.yaml"])
+@pytest.mark.parametrize("config", ["sources.yaml", "development.yaml"])
 def test_a_folder_with_other_data_hides_none_of_ours(config, tmp_path):
     sources = yaml.safe_load((DATA.parent / "config" / config).read_text())["sources"]
     for entry in filter(None, sources.values()):

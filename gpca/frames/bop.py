@@ -1,11 +1,9 @@
-"""Depth frames in the layout of the BOP benchmark, and, as a kind of source, views of objects cut out of them.
+"""Depth frames in the layout of the BOP benchmark.
 
 Format: https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_format.md. Lengths are millimeters in the
-files and meters here; cameras look along +z with x to the right and y down. A view is a cloud in the camera's frame,
-named ``obj_000014_48_1002`` by its object, the scene, and the image with the number of the annotation.
+files and meters here; cameras look along +z with x to the right and y down.
 """
 
-import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,9 +15,7 @@ from gpca.errors import InputError, refusing
 from gpca.io.files import read_image
 from gpca.io.structured_text import finite_numbers, read_json
 from gpca.numerals import whole
-from gpca.objects.bop import listed_objects
 from gpca.objects.camera import back_project
-from gpca.objects.surface import Surface, evenly, meters_per
 from gpca.rigid import require_rotation, rigid_motion
 
 REMEDY = "the folder may be half unpacked: unpack the dataset again"
@@ -28,9 +24,6 @@ FOCAL_PX = (1.0, 1e6)
 DEPTH_SCALES = (1e-6, 1e6)  # millimeters per unit: from nanometers to kilometers
 FARTHEST_MM = 1e6
 FEWEST_POINTS = 64
-VIEWS = 6  # of an object, as for an instance of the UW RGB-D Object Dataset
-RIM_FACTOR = 3.0  # times the median distance from the middle: farther points are background at a mask's rim
-MOST_ANNOTATIONS = 1000  # of an image
 
 
 def read_images(path: Path) -> dict[int, Any]:
@@ -217,41 +210,3 @@ def _needed_image(folder: Path, stem: str) -> Path:
     if (path := _image(folder, stem)) is None:
         raise InputError(folder / f"{stem}.png", "no such image", REMEDY)
     return path
-
-
-def require_entry(entry: dict, folder: Path) -> None:
-    """Raise an InputError unless the folder has frames, in millimeters, of each object that the entry names."""
-    if meters_per(entry.get("unit") or "mm") != meters_per("mm"):
-        raise InputError(f"unit '{entry['unit']}'", "is not that of BOP frames", "leave unit out")
-    missing = set(listed_objects(entry))
-    for path in scene_files([folder]):
-        annotations = [each for truth in read_images(path).values() if isinstance(truth, list) for each in truth]
-        missing -= {each.get("obj_id") for each in annotations if isinstance(each, dict)}
-        if not missing:
-            return
-    raise InputError(folder, f"no frame shows object {min(missing)}", "check objects in the config")
-
-
-def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
-    """Yield `views_per_instance` (default 6) views of the `objects` (ids, default all), spread over their frames."""
-    shown: dict[int, list] = {}
-    require_entry(entry, folder)
-    for frame in read_frames([folder]):
-        for place, annotation in enumerate(frame.annotations):
-            shown.setdefault(annotation.object_id, []).append((frame, place))
-    wanted = listed_objects(entry) or sorted(shown)
-    for number in wanted:
-        for frame, place in evenly(shown[number], entry.get("views_per_instance", VIEWS)):
-            try:
-                points_m, _ = measured_points(frame, frame.annotations[place], frame.depth_m())
-            except TooFewPoints as fault:
-                print(f"skipped: {fault}", file=sys.stderr)
-                continue
-            name = f"obj_{number:06d}_{frame.scene}_{MOST_ANNOTATIONS * frame.image + place}"
-            yield Surface(name, within_rim(points_m), None)
-
-
-def within_rim(points_m: np.ndarray) -> np.ndarray:
-    """Return points (P, 3) without the background at a mask's rim, for an object of unknown diameter."""
-    distances_P = np.linalg.norm(points_m - np.median(points_m, axis=0), axis=1)
-    return points_m[distances_P <= RIM_FACTOR * np.median(distances_P)]

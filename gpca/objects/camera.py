@@ -1,19 +1,13 @@
-"""A virtual RGB-D camera: ray casting, shading, noise of a structured-light sensor; and views of meshes as a source."""
+"""A virtual RGB-D camera: ray casting, shading, noise of a structured-light sensor."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 
-from gpca.errors import InputError
-from gpca.objects import mesh_folder
-from gpca.objects.canonical import bounding_center
-from gpca.objects.surface import Surface
 from gpca.process.environment import require_open3d
 from gpca.rigid import rigid_motion, rotate
-from gpca.seeds import generator
 from gpca.settings import Bounds, Positive
 
 Pixels = Annotated[int, Bounds(minimum=16, maximum=4096)]
@@ -180,37 +174,3 @@ def back_project(depth_m: np.ndarray, mask: np.ndarray, camera_3_3: np.ndarray) 
     y = (v - cy) / fy
     x = (u - cx - skew * y) / fx
     return np.stack([x * z, y * z, z], axis=1), np.stack([u, v], axis=1)
-
-
-VIEWS = 6
-ELEVATIONS_DEG = (30, 45, 60)
-VIEW_DISTANCE_M = 0.8
-VIEW_CAMERA, VIEW_NOISE = Camera(), DepthNoise()
-
-
-def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
-    """Return surfaces of a configured source: keys `files`, `unit` and `views_per_instance` (default 6)."""
-    for surface in mesh_folder.from_entry(entry, folder):
-        yield from rendered_views(surface, entry.get("views_per_instance", VIEWS))
-
-
-def rendered_views(mesh: Surface, count: int) -> Iterator[Surface]:
-    """Yield views ``obj_000007_1_0`` (mesh, elevation, number) of a mesh with z up, in the camera's frame, meters.
-
-    As in the UW RGB-D Object Dataset (Lai et al. 2011), the camera is 30, 45 and 60 degrees above a turntable in turn.
-    """
-    if mesh.faces is None:
-        raise InputError(f"object '{mesh.name}'", "is a cloud, of which there are no views", "use kind: mesh_folder")
-    center_m = bounding_center(mesh)
-    scene = MeshScene([(mesh.vertices_m, mesh.faces)])
-    for number in range(count):
-        level = number % len(ELEVATIONS_DEG)
-        toward = direction(2 * np.pi * number / count, np.deg2rad(ELEVATIONS_DEG[level]))
-        T_world_camera = look_at(center_m + VIEW_DISTANCE_M * toward, center_m)
-        name = f"{mesh.name}_{level + 1}_{number}"
-        depth_m = VIEW_NOISE.measure(scene.look(VIEW_CAMERA, T_world_camera), generator(name, "view"))
-        points_m, _ = back_project(depth_m, depth_m > 0, VIEW_CAMERA.matrix_3_3)
-        if len(points_m) == 0:
-            fault = f"is not seen from {VIEW_DISTANCE_M} m"
-            raise InputError(f"object '{mesh.name}'", fault, "check unit in the config")
-        yield Surface(name, points_m, None)

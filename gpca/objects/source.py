@@ -22,10 +22,7 @@ KINDS = {
     "bop": "gpca.objects.bop",
     "mesh_folder": "gpca.objects.mesh_folder",
     "uw_rgbd": "gpca.objects.point_files",
-    "bop_views": "gpca.frames.bop",
-    "mesh_views": "gpca.objects.camera",
 }
-NUMBERED = ("bop", "bop_views")  # whose objects have ids
 SYSTEM = ("/dev", "/proc", "/sys")
 TEXTS = (".md", ".txt")  # licenses beside data
 # Keys of an entry that a procedural source ignores: a config may lay one over a source of files.
@@ -46,7 +43,7 @@ def resolve(entry: dict, data_dir: str | None) -> dict:
             raise InputError(subject, "names no family", "set family in the config")
         module.require_family(entry["family"])
         return {name: value for name, value in entry.items() if name not in FILE_KEYS} | {"origin": PROCEDURAL}
-    if entry.get("objects") and entry["kind"] in set(KINDS).difference(NUMBERED):
+    if entry.get("objects") and entry["kind"] in set(KINDS).difference(["bop"]):  # whose objects have ids
         raise InputError("objects", f"are ids, which the kind {entry['kind']} has not", "leave it out, or use files")
     location, patterns = require_place(entry.get("location") or ""), entry.get("files") or ()
     require_patterns(patterns)

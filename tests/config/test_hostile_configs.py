@@ -163,7 +163,7 @@ VALUES = [
     # places
     (source(location="/dev"), "sources.mine", "devices"),
     (source(location="link"), "sources.mine", "devices"),
-    (source(location="fifo"), "sources.mine", "neither a folder nor a file"),
+    (source(location="fifo"), "sources.mine", "is not a folder"),
     (source(location="nowhere"), "sources.mine", "does not exist"),
     (source(location=""), "sources.mine.location"),
     (source(location="a\0b"), "sources.mine.location", "control character"),
@@ -181,8 +181,6 @@ VALUES = [
     (source(kind="bop", objects=[1, 2]), "sources.mine", "obj_000002.ply: no such model; check objects in the config"),
     (source(kind="bop", objects=[1, 1]), "sources.mine.objects", "twice"),
     (source(objects=[1]), "sources.mine", "objects: are ids, which the kind mesh_folder has not"),
-    (source(kind="bop_views", unit="mm", objects=[3, 9]), "sources.mine", "parts: no frame shows object 9"),
-    (source(kind="bop_views", unit="cm"), "sources.mine", "unit 'cm': is not that of BOP frames"),
     (source(kind="bop", files=["*.none"]), "sources.mine", "pattern '*.none': matches no file in"),
     ({"splits": {"objects": "nowhere.csv"}}, "splits.objects", "nowhere.csv: no such file"),
     ({"splits": {"scenes": "splits/objects.csv"}}, "splits.scenes", "column 'dataset' is missing"),
