@@ -11,6 +11,7 @@ from gpca.experiments.cause_figures import (
     TRUTH,
     _draw_scores,
     _draw_waterfall,
+    draw_causes_example,
     draw_failures,
     is_clear,
     usual_failure,
@@ -91,3 +92,13 @@ def test_a_failure_of_each_cause_is_shown_with_who_names_it(causes, tmp_path):
         shown = f"{concept}: {100 * errors[len(errors) // 2]:.0f} % off" if len(errors) else f"no failure by {concept}"
         [caption] = [each for each in words if each.startswith(shown)]
         assert not len(errors) or "right: all-knowing" in caption
+
+
+def test_the_example_names_its_dataset_and_who_is_right(causes, tmp_path):
+    predictions, [truth] = write_run(tmp_path, causes)
+    settings = CauseSettings(**FEW_CAUSES)
+    figure = draw_causes_example(objects_in(tmp_path), truth, predictions, settings, {"right": "Right"}, "Four")
+    words, row = words_of(figure), usual_failure(causes, truth, is_clear(causes))
+    assert words[0].startswith(f"Four: {causes.registrations.object_name[row].partition('_')[2].replace('_', ' ')}.")
+    phi_3 = np.maximum(causes.truth.phi[row], 0)
+    assert {"without causes", "Right", "right", *(f"{share:.2f}" for share in phi_3 / phi_3.sum())} <= set(words)
