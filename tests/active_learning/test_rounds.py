@@ -16,7 +16,6 @@ from gpca.active_learning.rounds import (
 )
 from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.classifier.settings import GPCSettings
-from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 
 QUICK = GPCSettings(learning_rate=0.05, iterations=30, inducing=12, draws=100)
@@ -85,15 +84,6 @@ def test_a_rare_concept_has_its_share_as_far_as_there_are_samples(embedded, init
     settings = dataclasses.replace(SETTINGS, initial=initial)
     counted = count(make_task(embedded, "overlap", settings, "tiny", 0, new_share=share).pool)
     assert (counted["noise"] + counted["pose"], counted["overlap"]) == left
-
-
-def test_too_few_training_samples_are_named(embedded):
-    for initial in (24, 26, 200):
-        with pytest.raises(InputError, match=rf"{initial} labeled samples of noise and pose: leaves none of 36 "):
-            make_task(embedded, "overlap", dataclasses.replace(SETTINGS, initial=initial), "tiny", 0)
-    without = embedded.subset(np.flatnonzero((embedded.concept != "overlap") | (embedded.split == "test")))
-    with pytest.raises(InputError, match="leaves none of 24 training samples"):
-        make_task(without, "overlap", SETTINGS, "tiny", 0)
 
 
 def test_projecting_a_task_changes_nothing_that_the_classifier_says(embedded, gpc, task):

@@ -14,7 +14,6 @@ from gpca.active_learning.settings import ActiveLearningSettings, StreamSettings
 from gpca.active_learning.stream import BayesianLayer, arrival_order, run_stream
 from gpca.classifier.latents import Projection
 from gpca.classifier.settings import GPCSettings
-from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 
 QUICK = GPCSettings(learning_rate=0.05, iterations=30, inducing=12, draws=100)
@@ -60,12 +59,6 @@ def test_the_new_concept_arrives_after_the_quiet_as_a_third(plain, arrivals, qui
     if arrivals == 150:
         assert [8 <= part.sum() <= 32 for part in np.split(is_new[30:], 2)] == [True, True]
         assert all(set(plain.pool.concept_N[part]) == {"noise", "pose"} for part in (order[:15], order[15:30]))
-
-
-@pytest.mark.parametrize("arrivals, quiet", [(181, 0), (150, 121), (220, 30), (30, 30), (30, 40), (31, 30)])
-def test_a_pool_too_small_for_the_stream_is_named(plain, arrivals, quiet):
-    with pytest.raises(InputError, match=rf"stream of {arrivals} arrivals: needs a larger pool than 120 known and 60"):
-        arrival_order(plain, StreamSettings(arrivals=arrivals, quiet=quiet), "blobs", 0)
 
 
 @pytest.mark.parametrize("budget", [0.05, 0.1, 0.3])

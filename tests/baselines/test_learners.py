@@ -130,14 +130,6 @@ def test_the_posterior_is_the_textbooks(embedded):
         assert deviation_N_C[:, c] ** 2 == pytest.approx(variance, abs=1e-5)
 
 
-def test_a_smaller_alpha_is_more_confident_and_far_away_the_posterior_is_the_prior(embedded):
-    learner, test = exact_gp(embedded, alpha=0.01), embedded.subset(embedded.rows("test"))
-    small, large = (each.explain(test).scores_N_C.max(axis=1) for each in (learner, exact_gp(embedded, alpha=0.5)))
-    assert small.mean() > large.mean()
-    far = dataclasses.replace(test, attached={"embedding": test.embedding + 1e4})
-    assert learner.explain(far).bald_N.min() > learner.explain(test).bald_N.mean()
-
-
 RANDOM = np.random.default_rng(0)
 TARGETS = np.arange(60) % 3
 H = 2 * RANDOM.normal(size=(3, 8))[TARGETS] + RANDOM.normal(size=(60, 8))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import rankdata
 
-from baselines.sensitivity import local_derivatives, partial_rank_correlations, single_drops, total_indices
+from baselines.sensitivity import local_derivatives, partial_rank_correlations, total_indices
 from gpca.explainers.registry import explainer_entry
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.uncertainty.designs import STEP, sample_knobs
@@ -60,11 +60,6 @@ def saltelli(base):
 def test_derivatives_are_forward_differences_from_the_untouched_pair():
     uncertainty = np.array([[2.0, *[99.0] * 7, 2.5, 1.0, 2.0], [0.0, *[99.0] * 7, 1e-6, 0.0, 1e4]])
     assert local_derivatives(uncertainty) == pytest.approx(np.array([[0.5, -1, 0], [1e-6, 0, 1e4]]) / STEP)
-
-
-def test_drops_are_what_each_feature_alone_changes():
-    worth = np.array([[10.0, 11, 13, 99, 6, 99, 99, 99], [-1.0, -1, -1, 5, -1, 5, 5, 5]])
-    assert np.array_equal(single_drops(worth), [[1, 3, -4], [0, 0, 0]])
 
 
 @pytest.mark.parametrize("k", [16, 24, 200])

@@ -111,15 +111,6 @@ def test_on_the_way_it_is_what_fewer_iterations_make_it(kernel):
     assert done == 9
 
 
-def test_the_bound_rises_with_the_fit():
-    bounds = []
-    gpc = GPC(CLASSES, QUICK, "blobs", 0)
-    for _ in gpc.fit_up_to([1, 10, 40], H, LABELS):
-        bounds.append(gpc.elbo())
-    assert bounds == sorted(bounds)
-    assert bounds[-1] < 0
-
-
 SEEN, NEW = LABELS != "overlap", np.flatnonzero(LABELS == "overlap")
 
 

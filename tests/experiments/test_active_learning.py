@@ -114,17 +114,6 @@ def test_table3_shows_the_papers_experiment_alone_its_conditions_and_lower_bound
     assert ("ycb", "pretrained", "labels_bald_kmeans", 16.0, 6.063449, 25.936551, 3, 600, False) in records
 
 
-def test_accuracies_have_the_farther_bounds_of_those_over_seeds_and_families(metrics):
-    table = made(table3_active_learning, metrics)
-    note = table.footnotes[0]
-    assert "± is the half-width of the 95 % t-interval over the seeds" in note
-    assert "the farther bounds of that and of Wilson's interval, for which a family of objects counts once" in note
-    few = dict.fromkeys(FAMILIES, 2)
-    wider = made(table3_active_learning, metrics, few)
-    assert wider.cells[2, "accuracy_bald_kmeans"].bounds[0] < table.cells[2, "accuracy_bald_kmeans"].bounds[0]
-    assert wider.cells[2, "labels_bald_kmeans"] == table.cells[2, "labels_bald_kmeans"]  # no share of samples
-
-
 def test_extended_averages_over_the_concepts_held_out_and_leaves_the_oracle_out_of_the_comparison(metrics):
     markdown = made(table3_extended, metrics).markdown()
     assert "Labels, overlap" in markdown

@@ -78,13 +78,6 @@ def test_the_best_rival_is_bold_with_the_bounds_of_the_bootstrap_and_samples_are
     assert "90 are nominal and 160 failed on each dataset." in of_both.footnotes[0]
 
 
-def test_the_calibration_error_is_a_share(intervals):
-    found = rows("ycb", "good", "poor", nominal_calibration=0.0284)
-    both = pd.concat([intervals, pd.DataFrame(found, columns=COLUMNS)])
-    text = table9_causes(both).markdown()
-    assert "| ECE (share) | ICP calls | n |" in text and "| 0.028 | 0 | 250 |" in text
-
-
 def test_what_is_read_is_shown_with_its_price(intervals):
     table = table9_features(intervals)
     text = table.markdown()

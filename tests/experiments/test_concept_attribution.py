@@ -1,6 +1,5 @@
 import csv
 import json
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -191,12 +190,6 @@ def test_ties_at_the_printed_precision_are_all_bold_unless_most_of_a_large_group
     assert replace(table, compared=([key for key in cells if key[0] > 1],)).best() == {
         (row, "a") for row in range(2, 7)
     }
-
-
-def test_column_text_rounds_and_shows_missing_intervals():
-    assert Column("A").text(Cell(97.749, 0.449, 5, 1000)) == "97.7 ± 0.4"
-    assert Column("A", decimals=2).text(Cell(97.749, math.nan, 1, 200)) == "97.75"
-    assert Column("A", decimals=0, interval=False).text(Cell(400.0, 0.1, 5, 1000)) == "400"
 
 
 def full(source, explainer, accuracy, **metrics):

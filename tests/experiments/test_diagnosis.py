@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gpca.causes.dataset import LABELS, labels_of
-from gpca.causes.judged import CEILING, Judged, ceiling_of, read_judged
+from gpca.causes.judged import CEILING, read_judged
 from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL
 from gpca.errors import InputError
 from gpca.evaluation.measures import POOLED, read_clustered, write_metrics
@@ -51,13 +51,6 @@ def test_who_is_right_has_full_marks_and_the_confusion_counts_every_labeled_samp
     labeled = (labels_of(causes.truth)[causes.rows("test")] != BORDERLINE).sum()
     named = rows[(rows["method"] == "always_pose") & rows["metric"].str.startswith("predicted_as_")]
     assert named["value"].sum() == labeled == sum(values(named, metric="predicted_as_pose"))
-
-
-def test_what_the_ceiling_names_nominal_has_its_score_of_it(causes):
-    ceiling = ceiling_of(causes.subset(causes.rows("test")), seed=0)
-    assert ((ceiling.named == NOMINAL) == (ceiling.nominal == 1)).all()
-    assert (ceiling.nominal[ceiling.named != NOMINAL] == 0).all()
-    assert ceiling.nominal + ceiling.scores.sum(axis=1) == pytest.approx(1)
 
 
 def test_all_sources_together_are_one_more_where_there_are_several(causes, tmp_path):
@@ -128,14 +121,6 @@ def test_a_run_is_collected_written_and_read(causes, tmp_path):
     write_metrics(rows.astype({"value": object}).assign(value="one"), tmp_path / "intervals.csv")
     with pytest.raises(InputError, match="column 'value' contains values that are not finite numbers"):
         read_clustered(tmp_path / "intervals.csv")
-
-
-def test_a_label_that_no_sample_has_leaves_measures_out_and_the_rest_readable(tmp_path):
-    judged = random_judged(60)
-    kept = Judged(**{name: array[judged.label != "noise"] for name, array in vars(judged).items()})
-    rows = diagnosis.compared_by_source({"tiny": {"one": kept, "other": kept}})
-    assert "auroc_failed" in set(rows["metric"])
-    assert np.isfinite(rows["value"]).all()
 
 
 def test_each_kind_of_stratum_divides_the_failed_and_the_states_all_that_is_judged():

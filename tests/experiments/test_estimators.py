@@ -77,11 +77,6 @@ def test_means_leave_out_a_tenth_at_either_end_by_weight():
     assert np.isnan(trimmed_mean(pd.Series([np.nan]), ones(1))[0])
 
 
-def test_the_coverage_is_by_the_quantile_of_six_degrees():
-    metrics = measure(rows(mahalanobis=np.where(np.arange(20) < 5, 12.591, 12.592)), ones())
-    assert metrics[f"coverage_{TRUTH}"] == pytest.approx(0.25)
-
-
 def test_of_gaussian_errors_a_right_covariance_scores_right():
     random = np.random.default_rng(0)
     errors = random.multivariate_normal(np.zeros(6), SIGMA, size=4000)

@@ -4,12 +4,10 @@ import pandas as pd
 import pytest
 
 from gpca.active_learning.curves import POOL_COLUMNS, write_curves
-from gpca.active_learning.settings import FrameLabelSettings, RetrainingSettings
 from gpca.declarations.plan import Run
 from gpca.errors import InputError
 from gpca.evaluation.measures import TIDY_COLUMNS
 from gpca.experiments.frame_labels import collect_labels, table6_labels
-from gpca.steps.frame_labels import rounds_of
 
 # Accuracies after 0, 4, 8 labels.
 ACCURACIES = {
@@ -58,12 +56,6 @@ def test_labels_are_counted_to_every_target_and_the_rest_stands_once(label_files
     metrics = pd.concat(found)
     assert "final_accuracy" not in set(metrics.query("table == 'active_learning/dgcnn/70'")["metric"])
     assert "epochs_at_target" not in set(metrics["metric"])  # counted to a single target alone
-
-
-def test_rounds_on_frames_take_what_rare_concepts_share_with_them():
-    rare = {"shares": [0.05, 0.01], "beside_seeds": 1, "labels": 550, "least": 60, "batch": 2, "late_batch": 10}
-    found = rounds_of(FrameLabelSettings(labels=30, least=12), rare)
-    assert found == RetrainingSettings(labels=30, least=12, batch=2, late_batch=10)
 
 
 FRAME_LABELS = {

@@ -18,7 +18,6 @@ from gpca.experiments.frame_pictures import (
     read_samples,
 )
 from gpca.experiments.frames import read_together
-from gpca.experiments.registration_stages import draw_scores
 from gpca.frames.synthesis import OCCLUDER, FrameSettings, make_frame_registrations
 from gpca.io.csv_file import write_csv
 from gpca.pairs.perturbation import CONCEPTS
@@ -129,19 +128,3 @@ def test_files_of_other_samples_and_metrics_of_other_methods_are_refused(results
         read_samples(tmp_path / "poses.csv", results / "real_rgbd/dgcnn-none/seed0.csv")
     with pytest.raises(InputError, match="are of none of these explainers"):
         draw_real_world_confusions(run_of("pointnet"), read_together(results / "metrics.csv"))
-
-
-def test_scores_are_bars_with_their_deviation_and_the_truth_in_bold():
-    import matplotlib.pyplot as plt
-
-    row = pd.Series(
-        {"concept_true": "pose"} | {f"score_{c}": s for c, s in zip(CONCEPTS, (0.2, 0.7, 0.1), strict=True)}
-    )
-    row = pd.concat([row, pd.Series({f"variance_{c}": 0.04 for c in CONCEPTS})])
-    figure, axes = plt.subplots()
-    draw_scores(axes, row)
-    assert [patch.get_width() for patch in axes.patches] == [0.2, 0.7, 0.1]
-    assert [text.get_text() for text in axes.texts if text.get_fontweight() == "bold"] == ["pose"]
-    ends = axes.collections[1].get_segments()[0]
-    assert np.allclose(ends[:, 0], [0.5, 0.9])
-    plt.close(figure)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from gpca.config.check import check
-from gpca.config.layers import without_false
 from gpca.declarations.plan import Run
 from gpca.errors import InputError
 from gpca.evaluation.measures import ALL, POOLED
@@ -151,9 +150,3 @@ def test_a_fault_of_the_config_is_one_line_that_names_the_key(key, value, messag
     with pytest.raises(InputError) as caught:
         check(changed(f"guarantee.{key}", value))
     assert str(caught.value).startswith(f"config key {message}")
-
-
-def test_an_explainer_that_the_diagnosis_leaves_out_has_no_guarantee():
-    config = without_false(changed("diagnosis.explainers.pair_committee", False))
-    assert "pair_committee" not in config["guarantee"]["explainers"]
-    assert "reenact_committee" in config["guarantee"]["explainers"]

@@ -9,8 +9,8 @@ import trimesh
 from gpca.causes.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
 from gpca.declarations.plan import Run
 from gpca.errors import InputError
-from gpca.experiments.method import choose_samples, choose_view, decide, fig2_overview, fig3_concepts
-from gpca.experiments.registration_stages import Staged, severity_text, source_before_icp
+from gpca.experiments.method import choose_samples, decide, fig2_overview, fig3_concepts
+from gpca.experiments.registration_stages import Staged, source_before_icp
 from gpca.io.arrays import save_arrays
 from gpca.objects.canonical import DRAWN
 from gpca.pairs.dataset import Registrations
@@ -114,25 +114,6 @@ def test_an_object_without_all_concepts_is_refused(files):
     _, registrations, _ = files
     with pytest.raises(InputError, match=r"r\.npz.*any object"):
         choose_samples(registrations.subset(np.flatnonzero(registrations.concept != "pose")), "r.npz")
-
-
-def test_the_view_is_a_rotation_that_sees_shift_and_length(clouds):
-    target = clouds[1]  # a bar along x
-    up = np.array([0, 0, 1.0])
-    view = choose_view(target, {"noise": target, "pose": target + 0.1 * up, "overlap": target[target[:, 0] > 0]})
-    np.testing.assert_allclose(view @ view.T, np.eye(3), atol=1e-12)
-    assert np.linalg.det(view) == pytest.approx(1)
-    assert view[1] @ up > 0.9
-    assert abs(view[0, 0]) > 0.9
-
-
-def test_severities_are_worded_with_their_units(files):
-    _, registrations, _ = files
-    assert severity_text(registrations, 0, "noise") == f"$\\sigma$ = {100 * registrations.severity_noise[0]:.1f} % $d$"
-    assert severity_text(registrations, 1, "pose").startswith(
-        f"{np.degrees(registrations.severity_rotation_rad[1]):.0f}°"
-    )
-    assert severity_text(registrations, 2, "overlap") == f"{100 * registrations.severity_crop[2]:.0f} % cut off"
 
 
 def test_draws_red_and_blue_in_three_panels_and_the_same_bytes_again(files, same_bytes):

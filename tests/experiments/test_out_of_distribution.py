@@ -12,7 +12,6 @@ from gpca.experiments.out_of_distribution import (
     RHO,
     SHIFTED,
     TABLE,
-    clusters_of,
     collect,
     samples_of_seed,
     table5_learners,
@@ -153,11 +152,6 @@ def test_intervals_hold_their_value_and_stay_within_its_limits(found):
     areas = found.xs("ece", level="metric")
     assert (areas["low"] >= 0).all() and (areas["high"] <= 1).all()
     assert (found["seeds"] == 2).all() and (found["clusters"] == 2).all()
-
-
-def test_the_other_sources_families_are_its_own():
-    rows = pd.DataFrame({"set": ["in_distribution", "source"], "cluster": ["box", "box"]})
-    assert clusters_of(rows) == ["box", "other/box"]
 
 
 VALUES = {  # learner -> accuracy, ρ, area, ECE

@@ -66,13 +66,6 @@ def test_the_round_asks_about_the_most_uncertain_and_about_different_ones(asked)
     assert len(set(asked.chosen)) == BATCH and set(asked.chosen) <= set(asked.candidates)
 
 
-def test_the_map_separates_what_the_embedding_separates(asked, stage_files):
-    concept_S = Staged.load(*stage_files).registrations.concept
-    centres = [asked.map_S_2[concept_S == concept].mean(axis=0) for concept in ("noise", "pose", "overlap")]
-    for i in range(3):
-        assert np.linalg.norm(centres[i] - centres[i - 1]) > 1
-
-
 def test_the_numbers_are_those_of_the_files_and_the_bytes_the_same_again(stage_files, curve_files, asked, same_bytes):
     def draw():
         return pipeline(stage_files, curve_files, "pointnet")

@@ -6,9 +6,7 @@ import pytest
 from gpca.causes.policy import NOTHING, QUEUE, TREATMENTS
 from gpca.declarations.plan import Run
 from gpca.errors import InputError
-from gpca.evaluation.intervals import wilson_interval
 from gpca.evaluation.measures import read_clustered
-from gpca.experiments.recovery import mean_seconds
 from gpca.experiments.recovery_measures import (
     collect,
     collect_differences,
@@ -100,13 +98,6 @@ def test_shares_are_pooled_over_the_failures_of_all_seeds(files):
     assert "wrong_first" not in set(metrics[metrics["concept"] == "overlap"]["metric"])  # none of them acted
 
 
-def test_seconds_are_summed_over_a_failure_and_averaged_over_failures(tmp_path):
-    path = tmp_path / "seed0.csv"
-    columns = {"episode": [0, 0, 1], "failed": True, "policy": "gpca", "explanation_seconds": 0.5}
-    write_csv(path, pd.DataFrame(columns | {"action_seconds": [1.0, 2.0, 3.0]}))
-    assert mean_seconds([path]) == {"gpca": pytest.approx((4.0 + 3.5) / 2)}
-
-
 def test_faulty_files_are_refused(files, tmp_path):
     write_csv(tmp_path / "less.csv", rows_of(EPISODES[0]).drop(columns="tries"))
     with pytest.raises(InputError, match="column 'tries' is missing"):
@@ -162,15 +153,6 @@ def test_shares_are_those_of_the_metrics(taken_files, shares):
     assert {metric for _, metric, _ in shares.index} == {
         "recovered_within_1", "recovered_within_2", "queued", "left_alone", "acted_nominal",
     }  # fmt: skip
-
-
-def test_clusters_are_the_tables_of_each_seed(shares):
-    row = shares.loc["gpca", "recovered_within_1", "all"]
-    assert (row["seeds"], row["clusters"], row["samples"]) == (2, 6, 18)
-    assert 0 <= row["low"] < row["value"] < row["high"] <= 1
-    assert shares.loc["gpca", "acted_nominal", "all"]["clusters"] == 8
-    row = shares.loc["always", "recovered_within_1", "all"]
-    assert (row["value"], row["low"], row["high"]) == pytest.approx((1, *wilson_interval(6, 6)))
 
 
 SOLVED = {  # policy -> of four failures, after how many actions each is recovered; 0 never

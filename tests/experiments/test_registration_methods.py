@@ -12,7 +12,6 @@ from gpca.evaluation.measures import COLUMNS, TIDY_COLUMNS, read_clustered, tidy
 from gpca.experiments import registration_methods
 from gpca.experiments.registration_methods import (
     collect,
-    read_seconds,
     share_of_milder,
     table11_registration,
     table11_severity,
@@ -145,16 +144,6 @@ def test_thirds_of_the_drawn_severities_have_a_third_of_the_draws_each():
     worst = pd.DataFrame({"severity_rotation_rad": [np.pi / 3, np.pi / 12], "severity_translation": [0.30, 0.05]})
     assert share_of_milder(worst, "pose", RANGES) == pytest.approx([1, 0])
     assert np.isfinite(share_of_milder(rows, "overlap", RANGES | {"crop": [0.3, 0.3]})).all()
-
-
-def test_seconds_are_means_of_each_start(tmp_path):
-    path = tmp_path / "timings/ycb/method_gicp/seed3.csv"
-    write_csv(path, pd.DataFrame({"sample": [0, 0, 1, 1], "start": ["initial", "fgr"] * 2, "seconds": [1, 3, 2, 5]}))
-    seconds = read_seconds([path])
-    assert value(seconds, method="gicp", metric="seconds") == 1.5
-    assert value(seconds, method="fgr+gicp", metric="seconds", seed=3, source="ycb", concept="all") == 4
-    with pytest.raises(InputError, match="no files were given"):
-        read_seconds([])
 
 
 def test_intervals_are_of_the_same_measures_over_all_pairs(files, object_files, tmp_path):

@@ -53,21 +53,6 @@ def test_where_none_is_uncertain_the_fit_is_a_poor_one(stages, stage_files, monk
     assert stages.words(of_training, "icp") == "nominal, ADD-S 1.2 % $d$"  # whose uncertainty is not measured
 
 
-def test_states_follow_the_limits_of_the_config(stage_files, monkeypatch):
-    *files, _ = stage_files
-    monkeypatch.setattr(Staged, "error", lambda self, row: 0.012)
-    assert Staged.load(*files, {"nominal": 0.001, "failed": 0.01}).state(0) == "failed"
-    assert Staged.load(*files, {"nominal": 0.001, "failed": 0.02}).state(0) == "borderline"
-
-
-def test_uncertainties_of_other_samples_are_refused(stage_files, tmp_path):
-    *files, uncertainties, limits = stage_files
-    (tmp_path / "seed0.csv").write_text(uncertainties.read_text().replace("\n", "\n99").removesuffix("99"))
-    fault = r"seed0\.csv: its samples differ from those of the registrations; regenerate both"
-    with pytest.raises(InputError, match=fault):
-        Staged.load(*files, tmp_path / "seed0.csv", limits)
-
-
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [

@@ -8,7 +8,6 @@ import pytest
 
 from gpca.attribution.predictions import prediction_frame
 from gpca.causes.dataset import LABELS, labels_of
-from gpca.causes.judged import CEILING
 from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.classifier.scores import Attribution
 from gpca.errors import InputError
@@ -107,13 +106,6 @@ def test_who_knows_the_labels_has_no_false_alarm_and_leads_the_gate(measured):
     guessing = of | {"learned": "objects", "method": GUESSING}
     assert value(measured, metric="auroc_failed", **guessing)["difference"] < 0
     assert value(measured, metric="cause_accuracy", **guessing)["value"] < 0.7
-
-
-def test_a_gate_names_no_cause_and_the_ceiling_has_no_rival(measured):
-    gate = rows_where(measured, method="gate_rmse", condition=NATURAL)
-    assert set(gate["metric"]) == {"test_samples", "auroc_failed", "false_alarm_rate", "state_accuracy"}
-    ceiling = rows_where(measured, method=CEILING)
-    assert len(ceiling) and (ceiling["gate"] == "").all() and ceiling["difference"].isna().all()
 
 
 def test_failures_of_a_global_methods_starts_count_as_often_as_their_pairs_stand_for(measured, causes):

@@ -2,7 +2,6 @@
 
 import pandas as pd
 import pytest
-import yaml
 
 from gpca.config.layers import with_defaults
 from gpca.errors import InputError
@@ -10,7 +9,6 @@ from gpca.evaluation.measures import tidy
 from gpca.experiments import registration_methods
 from gpca.experiments.registration_methods import read_seconds
 from gpca.experiments.scans import (
-    ChoiceSettings,
     check,
     collect,
     names,
@@ -20,7 +18,6 @@ from gpca.experiments.scans import (
     titles_of_scans,
 )
 from gpca.io.csv_file import write_csv
-from gpca.process.code_files import ROOT
 from gpca.reporting.tables.cells import rows_where
 from tests.experiments.runs import run_with
 from tests.scans.test_source import write_npz
@@ -73,13 +70,6 @@ def test_data_sets_that_exist_are_registered(config, tmp_path):
 def test_faults_of_a_config(config, key, value, message):
     with pytest.raises(InputError, match=message):
         check(config | {"scans": config["scans"] | {key: value}}, lambda key: set())
-
-
-def test_strata_ascend_and_the_smoke_run_has_the_virtual_set_alone(config):
-    with pytest.raises(InputError, match=r"strata: \[0.3, 0.1\] is not in ascending order"):
-        ChoiceSettings(strata=(0.3, 0.1))
-    smoke = yaml.safe_load((ROOT / "config/smoke.yaml").read_text())["scans"]["datasets"]
-    assert {name for name in config["scans"]["datasets"] if smoke[name] is False} == set(smoke) - {"virtual_scans"}
 
 
 def trials(starts=("initial", "teaser")):

@@ -9,14 +9,14 @@ import trimesh
 
 from gpca.errors import InputError
 from gpca.frames.instances import points_on_model
-from gpca.frames.rgbd_scene import SceneSettings, lay_table, stable_poses, write_scenes
+from gpca.frames.rgbd_scene import lay_table, stable_poses, write_scenes
 from gpca.io.files import read_image
 from gpca.objects.camera import DepthNoise
 from gpca.objects.surface import Surface
 from gpca.rigid import transform
 
 from ..hostile import refusal
-from .tiny import PERFECT, scene_settings, surfaces
+from .tiny import scene_settings, surfaces
 
 
 def files(folder):
@@ -71,12 +71,6 @@ def test_models_list_what_leaves_their_shape_as_it_is(scenes):
     assert symmetries["bracket"] == set()
     assert symmetries["brick"] == {"symmetries_discrete"}
     assert "symmetries_continuous" in symmetries["cone"]
-
-
-def test_ranges_that_run_downwards_are_refused():
-    with pytest.raises(InputError, match=r"distance_m: \[0.9, 0.5\] is in descending order"):
-        SceneSettings.from_dict({"distance_m": [0.9, 0.5]})
-    assert SceneSettings.from_dict({"noise": {"scale": 0.0, "dropout": 0.0}}).noise == PERFECT
 
 
 def surface(mesh, name="thing"):

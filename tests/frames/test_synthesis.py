@@ -111,9 +111,3 @@ def test_an_occluder_covers_the_share_in_one_piece(tiny, share):
     regions, count = label(covered, np.ones((3, 3)))
     assert np.bincount(regions.ravel())[1:].max() > 0.9 * covered.sum()
     assert count < 5
-
-
-def test_without_another_object_nothing_can_stand_in_front(tiny):
-    instances, _ = tiny
-    alone = replace(instances, object_index=np.zeros(len(instances), int))
-    assert occlude(alone, 0, instances.pixels_of(0), 0.4, np.random.default_rng(0)) is None

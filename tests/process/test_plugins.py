@@ -1,8 +1,6 @@
 """Code from outside: files and modules that a config names, and installed packages that announce themselves."""
 
 import sys
-from importlib import import_module
-from types import ModuleType
 
 import pytest
 
@@ -17,7 +15,6 @@ from gpca.process.plugins import load, named, use
 from gpca.process.registry import load as load_member
 
 from ..config.configs import load as load_config
-from ..plugins_apart import lies_outside
 
 EXPLAINER = """
 from gpca.explainers.interface import ExplainerEntry, ScoringExplainer
@@ -174,13 +171,3 @@ def test_a_file_is_imported_once_and_leaves_nothing_in_its_folder(folder, monkey
     assert load("once.py") is load(str(folder / "once.py")) is sys.modules["once"]
     assert load_member("net:Net") is dict
     assert {path.name for path in folder.iterdir()} == {"once.py", "beside.py", "net.py"}
-
-
-def test_the_tests_forget_plugins_and_no_module_of_a_library(folder):
-    write(folder, {"own": "SOURCES = {}\n", "helpers/helper": ""})
-    load("own.py")
-    helper = import_module("helpers.helper")
-
-    assert all(lies_outside(sys.modules[name]) for name in ("own", "helpers", helper.__name__))
-    # torch defines torch._C._functorch so, and imports it when it first needs it.
-    assert not any(map(lies_outside, (pytest, sys, ModuleType("of_c"), sys.modules[__name__])))

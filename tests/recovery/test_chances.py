@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gpca.causes.policy import NOTHING, QUEUE
+from gpca.causes.policy import NOTHING
 from gpca.errors import InputError
 from gpca.recovery.chances import Chances, ExpectedUtility, Trial, alarm_threshold, learn_gate
 
@@ -44,13 +44,6 @@ def test_chances_follow_what_is_known_and_what_always_helped_has_the_rate_of_suc
 def test_the_action_of_the_largest_gain_is_taken_and_none_where_nothing_is_wrong(chances, known_F, before, action):
     decision = ExpectedUtility(chances, COSTS).decide(np.array(known_F, float), before)
     assert decision.action == action
-
-
-def test_costs_weigh_against_chances(chances):
-    dear = ExpectedUtility(chances, {"denoise": 0.95, "new_view": 0.0})
-    assert dear.decide(np.array([-1.0, 1.0]), ()).action == "new_view"
-    hopeless = ExpectedUtility(chances, dict.fromkeys(COSTS, 1.0))
-    assert hopeless.decide(np.array([-1.0, 1.0]), ("denoise",)).action == QUEUE
 
 
 def test_what_may_be_right_is_left_alone_where_needless_acts_are_dear(chances):

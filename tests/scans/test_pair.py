@@ -124,14 +124,6 @@ def test_a_start_is_off_by_its_rung(kind):
     assert np.linalg.norm(shift_3) == pytest.approx(0.5 * scans.scale)
 
 
-def test_the_lowest_rung_is_the_truth_and_draws_are_named():
-    scans = pair()
-    np.testing.assert_allclose(disturbed(scans, Rung(0, 0), "tiny", 0), scans.T_target_source, atol=1e-12)
-    first, again, other = (disturbed(scans, Rung(10, 0.1), "tiny", seed) for seed in (0, 0, 1))
-    assert (first == again).all() and not np.allclose(first, other)
-    assert Rung(10, 0.25).name == "10deg_0.25m"
-
-
 def test_pairs_in_a_row_are_on_different_rungs_whose_order_is_drawn():
     ladder = [Rung(10 * i, 0) for i in range(5)]
     rungs = rungs_of(23, ladder, "tiny", 0)
