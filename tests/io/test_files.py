@@ -15,9 +15,8 @@ from gpca.io.files import read_image, require_file, whole_file, whole_folder
 from gpca.io.structured_text import read_json, read_mapping
 from gpca.model.clouds import read_points, read_pose
 from gpca.model.file import Model
-from gpca.objects import point_files
 from gpca.objects.bop import read_models_info
-from gpca.objects.downloads import open_archive
+from gpca.objects.downloads import unpack
 from gpca.objects.mesh_folder import read_surface
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -84,8 +83,7 @@ READERS = {
     "models_info.json": read_models_info,
     "mine.yaml": read_mapping,
     "pose.txt": read_pose,
-    "data.zip": lambda path: next(iter(open_archive(path).__enter__())),
-    "view.pcd": lambda path: next(point_files.from_entry({}, path.parent)),
+    "data.zip": lambda path: unpack(path, path.parent / "unpacked"),
     "part.obj": lambda path: read_surface(path, 1.0),
     **{f"cloud.{suffix}": lambda path: read_points(path) for suffix in ("ply", "pcd", "obj", "stl", "off")},
 }
