@@ -28,7 +28,6 @@ def add_bench_arguments(parser: ArgumentParser) -> None:
     add("--link", default="none", help="link to code or a paper, for that head")
     add("--samples", type=Path, help="folder of the samples (default: the user's cache)")
     add("--data-dir", type=Path, help="folder of data that the repository does not have (track scans)")
-    add("--learn-from", help="what it learns from, where there is a choice: scans (default) or objects")
     add("--processes", type=COUNT, help="processes that make samples (default: one per core)")
 
 
@@ -43,7 +42,7 @@ def run_bench(options: Namespace) -> None:
     if options.track == REPAIR:
         from gpca.tracks.repair import own_function, repair_table
 
-        for name in ("out", "settings", "learn_from", "data_dir"):
+        for name in ("out", "settings", "data_dir"):
             if getattr(options, name):
                 option = f"--{name.replace('_', '-')}"
                 raise InputError(option, f"is no option of the track {REPAIR}", "leave it out")
@@ -60,13 +59,12 @@ def run_bench(options: Namespace) -> None:
     if options.out and len(names) > 1:
         fault = f"lists {len(names)} methods for this track, and --out holds the predictions of one"
         raise InputError(options.method, fault, "give each a file of its own")
-    training = track.training(options.learn_from)
     samples = TrackSamples.of(track, options.samples, options.processes, options.data_dir)
     published_names = {method.name for method in samples.published.methods}
     methods: dict[str, Method] = {}
     for name in names:
         print(f"{name}: learning and predicting", file=sys.stderr)
-        method, seconds = try_method(samples, name, options.settings, training)
+        method, seconds = try_method(samples, name, options.settings)
         if method.name in published_names:
             method = replace(method, name=f"{method.name} (here)", title=f"{method.title} (here)")
         methods[method.name] = method

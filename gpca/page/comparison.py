@@ -14,20 +14,15 @@ REPEAT, DEVIATION = "repeat", "standard deviation"  # rows that are counted apar
 _NUMBERS = ("published", "upper", "deviation", "reproduced", "ci_low", "ci_high", "difference")
 
 
-def page_comparison(path: str | Path, reference: str | Path | None = None) -> dict | None:
+def page_comparison(path: str | Path) -> dict | None:
     """Return the rows of ``comparison.csv`` in words by table, and verdicts with tone and number; None without it.
 
-    Where no number of the run is judged, as on stand-ins, the rows are those of the reference, with the run's values as
-    ``this_run``. Repeats of a value and standard deviations are counted apart. A table's title names its only objects;
-    otherwise each row does, unless its name says so.
+    Repeats of a value and standard deviations are counted apart. A table's title names its only objects; otherwise each
+    row does, unless its name says so.
     """
     if not Path(path).is_file():
         return None
     rows = _rows(path)
-    is_reference = reference is not None and not any(row["tone"] for row in rows)
-    if reference is not None and is_reference:
-        this_run = {number_of(row): row["reproduced"] for row in rows}
-        rows = [row | {"this_run": this_run.get(number_of(row), "")} for row in _rows(reference)]
     tables = []
     for name in dict.fromkeys(row["table"] for row in rows):
         table_rows = [row for row in rows if row["table"] == name]
@@ -41,7 +36,6 @@ def page_comparison(path: str | Path, reference: str | Path | None = None) -> di
     counts = Counter(row["group"] for row in rows)
     order = [*TONES, *sorted(set(counts) - {*TONES, DEVIATION, REPEAT}), DEVIATION, REPEAT]
     return {
-        "is_reference": is_reference,
         "tables": tables,
         "verdicts": [(verdict, TONES.get(verdict, ""), counts[verdict]) for verdict in order if counts[verdict]],
     }

@@ -63,7 +63,6 @@ class FinishedRun:
     results: Sequence[Shown]  # tables and figures, in order
     causes: Mapping[str, Mapping[str, str]]  # source -> files for :func:`cause_samples`
     titles: Titles  # of the explainers
-    reference: str | None  # ``comparison.csv`` of a run on real objects, shown where nothing of this run is judged
     config: Mapping  # the whole configuration
     command: str  # that makes what is missing
 
@@ -104,7 +103,7 @@ def write_page(folder: str | Path, run: FinishedRun) -> None:
         groups={title: results for title, results in groups.items() if results},
         rest=REST,
         sections=sections,
-        comparison=page_comparison(folder / "comparison.csv", run.reference),
+        comparison=page_comparison(folder / "comparison.csv"),
         links=links,
         samples=samples,
         provenance=read_provenance(recorded + sample_files),

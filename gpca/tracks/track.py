@@ -10,7 +10,7 @@ from typing import Any
 from gpca.causes.dataset import LABELS
 from gpca.causes.settings import OBJECTS, SCANS
 from gpca.causes.truth import NOMINAL
-from gpca.errors import InputError, require_known
+from gpca.errors import require_known
 from gpca.explainers.registry import CAUSES, CONCEPTS
 from gpca.frames.source import REAL_WORLD
 from gpca.pairs.perturbation import CONCEPTS as PERTURBATIONS
@@ -45,7 +45,7 @@ class Track:
     labeled_by: tuple[str, ...] = ()  # the identifying columns of that file
     read: tuple[str, ...] = ()  # patterns of further files that methods may read
     training_folders: tuple[str, ...] = ()  # files of objects that methods learn from
-    learn_from: tuple[str, ...] = ()  # choices of the training data, the default first
+    learn_from: tuple[str, ...] = ()  # training data of published methods, that without a mark first
     without_training: str = ""  # what to learn from, where all samples are for testing
     groups: str = ""  # column head of the groups of samples that are scored separately; empty for one group
     required_states: tuple[str, ...] = ("failed",)  # nothing is concluded from a group with few of one of them
@@ -70,15 +70,6 @@ class Track:
     def may_lack(self, source: str) -> bool:
         """Return whether the samples of a source may be left out, as its data has to be obtained."""
         return bool(self.everywhere) and source not in self.everywhere
-
-    def training(self, asked: str | None) -> str:
-        """Return the choice of training data, by default the first one; empty where there is no choice."""
-        if asked is None:
-            return next(iter(self.learn_from), "")
-        if not self.learn_from:
-            raise InputError("--learn-from", f"is no choice on the track {self.name}", "leave it out")
-        require_known("--learn-from", asked, self.learn_from)
-        return asked
 
     def file(self, source: str, seed: int) -> str:
         """Return the path of a file of samples below the folder of a run or a cache."""

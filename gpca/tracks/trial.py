@@ -16,7 +16,7 @@ import numpy as np
 from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import read_predictions
 from gpca.causes.dataset import Causes
-from gpca.causes.settings import OBJECTS, DescriptorSettings
+from gpca.causes.settings import SCANS, DescriptorSettings
 from gpca.classifier.scores import Attribution
 from gpca.encoders.registry import EncoderSettings
 from gpca.experiments.scan_causes import diagnosis_settings
@@ -64,13 +64,12 @@ class PartPredictions(NamedTuple):
 
 
 class MethodTrial(NamedTuple):
-    """A method on a track; `training` is what it learns from, on a track that has a choice."""
+    """A method on a track."""
 
     samples: TrackSamples
     name: str
     entry: ExplainerEntry
     settings: dict[str, Any]
-    training: str
 
 
 @dataclass(frozen=True)
@@ -105,12 +104,10 @@ def try_on_few(samples: TrackSamples, name: str, entry: ExplainerEntry, settings
         published = replace(samples.published, hashes={})
         few = FewSamples(track, published, Path(folder), samples.processes, whole=samples.config)
         [(source, seed, _)] = few.parts()
-        explain(MethodTrial(few, name, entry, dict(settings), ""), source, seed)
+        explain(MethodTrial(few, name, entry, dict(settings)), source, seed)
 
 
-def try_method(
-    samples: TrackSamples, name: str, settings: Mapping[str, Any], training: str = ""
-) -> tuple[Method, float]:
+def try_method(samples: TrackSamples, name: str, settings: Mapping[str, Any]) -> tuple[Method, float]:
     """Return an explainer's predictions for all test samples of a track, and its seconds per registration.
 
     Its inputs are measured beforehand, and their time is not counted.
@@ -123,7 +120,7 @@ def try_method(
     if not all((samples.folder / file).is_file() for file in files):
         try_on_few(samples, name, entry, settings)
     samples.files(files)  # together, so that several are made at once
-    trial = MethodTrial(samples, name, entry, dict(settings), training)
+    trial = MethodTrial(samples, name, entry, dict(settings))
     if track.name == SCANS_TRACK:
         answers = _scans(trial)
     else:
@@ -134,8 +131,7 @@ def try_method(
         scores_N_C[part_rows], named_N[part_rows] = answer.scores, answer.named
     calls = round(float(np.mean([answer.calls for answer in answers])))
     seconds = float(np.mean([answer.seconds for answer in answers]))
-    name, title = (track.with_training(text, training) for text in (name, entry.title))
-    return Method(name, title, entry.sight, calls, scores_N_C, named_N), seconds
+    return Method(name, entry.title, entry.sight, calls, scores_N_C, named_N), seconds
 
 
 def _causes(trial: MethodTrial, source: str, seed: int) -> PartPredictions:
@@ -218,11 +214,8 @@ def _frames(trial: MethodTrial, source: str, seed: int) -> PartPredictions:
 def _scans(trial: MethodTrial) -> list[PartPredictions]:
     """Return those for each data set; the data sets of a seed are learned and explained together, by a run's step."""
     samples, reads, parts = trial.samples, trial.entry.reads, trial.samples.parts()
-    settings = diagnosis_settings(samples.config, {trial.name: [trial.training]}, {trial.name: trial.settings})
+    settings = diagnosis_settings(samples.config, {trial.name: [SCANS]}, {trial.name: trial.settings})
     folders = {"encoders": "cause_encoders"} if reads == EMBEDDINGS else {}
-    if trial.training == OBJECTS:
-        kind = reads if reads in FOLDERS else DESCRIBED
-        folders |= {"causes": "causes", kind: FOLDERS[kind]}
     by_seed = {}
     for seed in dict.fromkeys(seed for _, seed, _ in parts):
         sets = [source for source, of, _ in parts if of == seed]

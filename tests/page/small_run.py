@@ -57,7 +57,6 @@ def run_of(folder, **changes):
         "results": results(),
         "causes": {"bricks": {"objects": folder / "objects/four.npz", "causes": folder / "causes/four/seed100.npz"}},
         "titles": Titles({"gpca": {"title": "GP-CA", "oracle": False}}, {}, {}, 3),
-        "reference": None,
         "config": {
             "run": "tiny",
             "note": "</script><script>alert(1)</script>",

@@ -46,19 +46,6 @@ def test_verdicts_are_counted_from_the_best_to_the_worst(tmp_path):
     assert shown["verdicts"] == expected
 
 
-def test_where_nothing_is_judged_the_verdicts_are_the_references(tmp_path):
-    (tmp_path / "real").mkdir()
-    reference = written(tmp_path / "real", HEAD + "".join(LINES))
-    own = LINES[0].replace(",close,", ",not comparable,").replace("97.44", "88.8")
-    shown = page_comparison(written(tmp_path, HEAD + own), reference)
-    assert shown["is_reference"]
-    assert [row["verdict"] for row in rows_of(shown)] == ["close", "reproduced", "not reproduced", "not run"]
-    assert [row["this_run"] for row in rows_of(shown)] == ["88.8", "", "", ""]
-    judged = page_comparison(written(tmp_path, HEAD + own + LINES[1]), reference)
-    assert not judged["is_reference"]
-    assert [row["verdict"] for row in rows_of(judged)] == ["not comparable", "reproduced"]
-
-
 def test_repeats_and_standard_deviations_are_counted_apart(tmp_path):
     repeat = LINES[0].replace("mean,,", "mean,I / YCB / SA,")
     deviation = LINES[1].replace("mean,", "deviation,")

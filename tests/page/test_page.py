@@ -11,7 +11,6 @@ from gpca.page.page import Links, in_groups, read_provenance, write_page
 from gpca.process.processor import describe
 from tests.accessible import faults_of
 from tests.page.small_run import FIGURES, TABLES, Page, results, run_of
-from tests.page.test_comparison import HEAD, LINES
 
 
 def test_every_link_leads_to_a_file_or_a_place_on_the_page(page, folder):
@@ -61,21 +60,6 @@ def test_a_large_table_is_shown_in_part_and_whole_behind_a_click(copied):
     part, folded = text.split('<article id="table4_mine">')[1].split("</article>")[0].split('<details class="whole">')
     assert "1 of 2 rows. All of it here:" in folded
     assert (part.count('<th scope="row">'), folded.count('<th scope="row">')) == (1, len(whole["rows"]))
-
-
-def test_a_run_on_stand_ins_shows_the_verdicts_of_the_reference_as_such(copied):
-    folder, _ = copied
-    reference = folder.parent / "reference.csv"
-    reference.write_text(HEAD + "".join(LINES))
-    own = LINES[0].replace(",close,", ",not comparable,").replace("97.44", "88.8")
-    (folder / "comparison.csv").write_text(HEAD + own)
-    write_page(folder, run_of(folder, reference=reference))
-    text = (folder / "index.html").read_text()
-    assert "These are the verdicts <strong>of the reference run on real objects</strong>" in text
-    assert re.search(r'aria-pressed="true"><b>1</b> close<', text)
-    assert "not comparable" not in text
-    assert '<td data-label="This run">88.8</td>' in text
-    assert "The objects of this run are stand-ins, so none of its numbers is judged" in text
 
 
 def test_the_comparison_comes_with_its_verdicts_counted_and_named(page):

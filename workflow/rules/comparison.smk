@@ -1,7 +1,4 @@
 # The numbers that the paper prints beside those of the run, and the page of the run.
-from os.path import relpath
-
-from gpca.process.code_files import ROOT
 from gpca.comparison.claims import counterparts_of, read_claims
 from gpca.comparison.published import read_published
 from gpca.comparison.values import folders_behind
@@ -41,14 +38,12 @@ COMPARED_PREDICTIONS = [
 ]
 # Sources whose first failures the page shows with their measured causes.
 MEASURED = SOURCES if NAMES["cause_explainer"] else []
-# What the page says first comes from these; where all objects of the run are stand-ins, the verdicts are those of the
-# reference on real ones.
+# What the page says first comes from these.
 FOUND = [
     *("attribution_intervals.csv", "cause_intervals.csv"),
     *("real_world_intervals.csv", "active_learning.csv", "recovery_intervals.csv"),
 ]
 ROOT_OF_RUN = Path("results", config["run"])
-REFERENCE = ROOT / "results/reference/full/comparison.csv"
 
 
 onsuccess:
@@ -92,7 +87,6 @@ rule page:
     input:
         comparison="<results>/comparison.csv",
         found=[f"<results>/{name}" for name in FOUND],
-        reference=[relpath(REFERENCE)] if REFERENCE.is_file() else [],
         results=[f"<results>/{file}" for result in RESULTS for file in result.all_files],
         objects=collect("<results>/objects/{source}.npz", source=MEASURED),
         causes=collect(

@@ -20,7 +20,6 @@ with workflow_script(snakemake):
         results=[Shown(*fields) for fields in given.shown],
         causes=causes,
         titles=Titles(**given.titles),
-        reference=next(iter(files.reference), None),
         config=given.config,
         command=f"snakemake -j2 {snakemake.output.page}",
     )
