@@ -1,7 +1,7 @@
 """The steps of diagnoses: explainers of causes on held-out objects, on parts of what is read, and on depth frames."""
 
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -30,6 +30,7 @@ from gpca.explainers.interface import (
 )
 from gpca.explainers.registry import CAUSES, explainer_entry
 from gpca.io.csv_file import write_csv
+from gpca.io.frame import Frame
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.pairs.dataset import Registrations, read_embedding
@@ -84,21 +85,17 @@ def _others(job: Job) -> dict[int, list[tuple[Path, Path]]]:
 
 def diagnose_frames(job: Job) -> None:
     """Ask explainers that learned from all sources about the causes of registrations of depth frames -> predictions."""
-    import pandas as pd
-
-    learned = {"causes": job.causes, DESCRIBED: job.descriptors, "encoders": job.encoders, EMBEDDINGS: job.embeddings}
-    learned |= {REENACTED: job.get("reenactments", []), "further": job.get("further", [])}  # where they are read
-    enacted = job.get("frame_reenactments")
+    learned, enacted = learned_files(job), job.get("frame_reenactments")
     inputs = [job.frame_causes, *filter(None, [enacted]), *(path for paths in learned.values() for path in paths)]
     with record_provenance([job.predictions], inputs, job.settings, seed=job.seed):
         causes = Causes.load(job.frame_causes, (job.source, job.seed))
         frames = frames_to_explain(job, causes, enacted, learned)
-        predictions = []
-        for name, settings in job.section("explainers").items():
-            attribution = frames.attribution(name, settings or {})
-            assert attribution is not None  # objects have all labels
-            predictions.append(prediction_frame(causes.registrations, attribution).assign(explainer=name))
-        write_csv(job.predictions, pd.concat(predictions))
+        write_csv(job.predictions, frames.predictions(job.section("explainers"), causes.registrations))
+
+
+def learned_files(job: Job) -> dict[str, list[Path]]:
+    """Return the files that explainers learn from, those of all sources of objects, by what explainers read of them."""
+    return {name: job.get(name, []) for name in ("causes", DESCRIBED, REENACTED, "encoders", EMBEDDINGS, "further")}
 
 
 def explained(
@@ -224,6 +221,17 @@ class World:
         self._prepared[reads, learned_from] = list(zip(learned or asked, asked, strict=True))
         return self._prepared[reads, learned_from]
 
+    def predictions(self, explainers: Mapping[str, dict | None], shown: Registrations, **columns: np.ndarray) -> Frame:
+        """Return the predictions of explainers that learned from objects, name -> settings, with further columns."""
+        import pandas as pd
+
+        frames = []
+        for name, settings in explainers.items():
+            attribution = self.attribution(name, settings or {})
+            assert attribution is not None  # objects have all labels
+            frames.append(prediction_frame(shown, attribution).assign(explainer=name, **columns))
+        return pd.concat(frames)
+
     def attribution(self, name: str, settings: dict, learned_from: str = OBJECTS) -> Attribution | None:
         """Return the mean of the scores over all encoders; None where it would learn from fewer than two classes."""
         entry, all_scores, all_abstained = explainer_entry(name, CAUSES), [], []
@@ -239,8 +247,8 @@ class World:
                 if self._fold_S is not None and len(np.unique(learned.concept)) < FEWEST_LABELS:
                     return None
                 explainer = entry.made(*self._axes, **settings)
-                further = self._files.get("further", []) if learned_from == OBJECTS else []
-                fit(explainer, entry, [learned], further, self._left_out if learned_from == OBJECTS else ())
+                others = (self._files["further"], self._left_out) if learned_from == OBJECTS else ((), ())
+                fit(explainer, entry, [learned], *others)
                 answers.append(answer_of(explainer, observed_only(asked.subset(rows)), LABELS))
             order = np.argsort(np.concatenate([rows for rows, _ in parts]))
             all_scores.append(np.concatenate([answer.scores_N_C for answer in answers])[order])

@@ -17,7 +17,7 @@ from gpca.causes.descriptors import describe_all
 from gpca.causes.scans import GLOBAL, LADDER, ScanStart, measure_scans, motion_between
 from gpca.causes.settings import OBSERVED, CauseSettings, DescriptorSettings, ScanSamples
 from gpca.errors import InputError
-from gpca.explainers.interface import EMBEDDINGS, REENACTED
+from gpca.explainers.interface import REENACTED
 from gpca.io.csv_file import write_csv
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
@@ -29,7 +29,7 @@ from gpca.scans.pair import Rung, ScanPair, ScanSuccess, disturbed
 from gpca.scans.scene import ScanPairs
 from gpca.seeds import generator
 from gpca.settings import fields_of, read_settings
-from gpca.steps.diagnosis import DESCRIBED, World, with_what_it_reads
+from gpca.steps.diagnosis import DESCRIBED, World, learned_files, with_what_it_reads
 from gpca.steps.scans import TrialSettings, drawn_pairs, pair_to_register
 
 GlobalMethod = Callable[[ScanPair], np.ndarray | None]  # returns T_target_source (4×4), meters; None where it fails
@@ -109,8 +109,7 @@ def diagnose(job: Job) -> None:
     import pandas as pd
 
     scans = [job.scan_causes, job.scan_descriptors, job.scan_reenactments]
-    # Files of each source; re-enactments only where an explainer reads them.
-    training = {name: job.get(name, []) for name in ("causes", DESCRIBED, REENACTED, "encoders", EMBEDDINGS)}
+    training = learned_files(job)
     inputs = [path for files in (*scans, *training.values()) for path in files]
     with record_provenance([job.predictions], inputs, job.settings, seed=job.seed):
         own, parts = [], []

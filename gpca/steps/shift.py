@@ -180,33 +180,29 @@ def _measured(parts: dict[str, Registrations], source: str, seed: int, settings:
             query_S_F = spaces[space][name][test]
             if space == "embedding":
                 features_N_F, query_S_F = principal_components(features_N_F, query_S_F)
-            distance_S_K[test, 2 * i] = knn_distance(features_N_F, query_S_F, settings.neighbours)
-            distance_S_K[test, 2 * i + 1] = mahalanobis_distance(features_N_F, query_S_F)
+            distance_S_K[test, 2 * i : 2 * i + 2] = distances(features_N_F, query_S_F, settings.neighbours)
         columns = {column: getattr(part, column) for column in kept}
         joined.append(ShiftedSets(set=np.full(len(part), name), h=part.embedding, distance=distance_S_K, **columns))
     return ShiftedSets.joined(joined)
 
 
-def knn_distance(train_N_F: np.ndarray, query_S_F: np.ndarray, neighbours: int = 10) -> np.ndarray:
-    """Mean Euclidean distance (S,) to the nearest training samples, or to all; features are standardized on these."""
+def distances(train_N_F: np.ndarray, query_S_F: np.ndarray, neighbours: int) -> np.ndarray:
+    """Return distances (S, 2) in features that are standardized on the training samples.
+
+    The first is the mean Euclidean distance to the nearest of them, or to all, the second that to their mean by their
+    covariance (Ledoit & Wolf 2004).
+    """
+    from scipy.linalg import pinvh
+    from sklearn.covariance import ledoit_wolf
     from sklearn.neighbors import NearestNeighbors
     from sklearn.preprocessing import StandardScaler
 
     scaler = StandardScaler().fit(train_N_F)
-    nearest = NearestNeighbors(n_neighbors=min(neighbours, len(train_N_F))).fit(scaler.transform(train_N_F))
-    return nearest.kneighbors(scaler.transform(query_S_F))[0].mean(axis=1)
-
-
-def mahalanobis_distance(train_N_F: np.ndarray, query_S_F: np.ndarray) -> np.ndarray:
-    """Return the distance (S,) to the mean of the training samples by their covariance (Ledoit & Wolf 2004)."""
-    from scipy.linalg import pinvh
-    from sklearn.covariance import ledoit_wolf
-    from sklearn.preprocessing import StandardScaler
-
-    scaler = StandardScaler().fit(train_N_F)
-    precision_F_F = pinvh(ledoit_wolf(scaler.transform(train_N_F))[0])
-    offsets_S_F = scaler.transform(query_S_F)
-    return np.sqrt(np.maximum(np.einsum("sf,fg,sg->s", offsets_S_F, precision_F_F, offsets_S_F), 0))
+    train_N_F, offsets_S_F = scaler.transform(train_N_F), scaler.transform(query_S_F)
+    nearest = NearestNeighbors(n_neighbors=min(neighbours, len(train_N_F))).fit(train_N_F)
+    precision_F_F = pinvh(ledoit_wolf(train_N_F)[0])
+    squares_S = np.maximum(np.einsum("sf,fg,sg->s", offsets_S_F, precision_F_F, offsets_S_F), 0)
+    return np.stack([nearest.kneighbors(offsets_S_F)[0].mean(axis=1), np.sqrt(squares_S)], axis=1)
 
 
 def principal_components(train_N_d: np.ndarray, query_S_d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 
 from gpca.alignment.icp import Method
-from gpca.attribution.predictions import prediction_frame
 from gpca.causes.dataset import Causes, labeled
 from gpca.causes.descriptors import describe_all
 from gpca.causes.drawing import draw_shifted
 from gpca.causes.settings import CauseSettings, DescriptorSettings
-from gpca.explainers.interface import EMBEDDINGS, REENACTED
+from gpca.explainers.interface import REENACTED
 from gpca.io.csv_file import write_csv
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
@@ -23,7 +22,7 @@ from gpca.reenactment.dataset import reenact_all
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.seeds import seed_of_file
 from gpca.settings import read_settings
-from gpca.steps.diagnosis import DESCRIBED, World, with_what_it_reads
+from gpca.steps.diagnosis import DESCRIBED, World, learned_files, with_what_it_reads
 
 STANDARD = "standard"  # the truth that explainers learn
 LABELS = ("shift", "source", "explainer")  # columns before those of predictions
@@ -89,20 +88,16 @@ class Asked:
 
 def asked_about(job: Job) -> Iterator[Asked]:
     """Yield the test samples of the truth that was learned and of each shift; a shift's files are named by it."""
-    names, files = (DESCRIBED, REENACTED), zip(job.causes, job.descriptors, job.reenactments, strict=True)
-    for path, *read in files:
-        yield Asked(STANDARD, path.parent.name, Causes.load(path), dict(zip(names, read, strict=True)))
-    shifted = zip(job.shifted_causes, job.shifted_descriptors, job.shifted_reenactments, strict=True)
-    for path, *read in shifted:
-        yield Asked(path.parts[-4], path.parent.name, Causes.load(path), dict(zip(names, read, strict=True)))
+    files = list(zip(job.causes, job.descriptors, job.reenactments, strict=True))
+    shifted = list(zip(job.shifted_causes, job.shifted_descriptors, job.shifted_reenactments, strict=True))
+    for path, described, enacted in files + shifted:
+        shift = STANDARD if path in job.causes else path.parts[-4]
+        yield Asked(shift, path.parent.name, Causes.load(path), {DESCRIBED: described, REENACTED: enacted})
 
 
 def diagnose(job: Job) -> None:
     """Train every explainer on the training samples of all sources, and ask it about each shift -> its predictions."""
-    import pandas as pd
-
-    learned = {"causes": job.causes, DESCRIBED: job.descriptors, "encoders": job.encoders, EMBEDDINGS: job.embeddings}
-    learned |= {REENACTED: job.reenactments, "further": job.get("further", [])}
+    learned = learned_files(job)
     inputs = [path for paths in learned.values() for path in paths]
     inputs += [*job.shifted_causes, *job.shifted_descriptors, *job.shifted_reenactments]
     with record_provenance([job.predictions], inputs, job.settings, seed=job.seed):
@@ -121,9 +116,4 @@ def diagnose(job: Job) -> None:
             "sample": np.concatenate([part.sample for part in tested]),
             "concept_true": np.concatenate([part.concept for part in tested]),  # of borderline samples as well
         }
-        predictions = []
-        for name, settings in job.section("explainers").items():
-            attribution = world.attribution(name, settings or {})
-            assert attribution is not None  # objects have all labels
-            predictions.append(prediction_frame(every, attribution).assign(explainer=name, **columns))
-        write_csv(job.predictions, pd.concat(predictions))
+        write_csv(job.predictions, world.predictions(job.section("explainers"), every, **columns))

@@ -14,8 +14,7 @@ from gpca.pairs.shifted_sets import TRAINED_ON
 from gpca.steps.shift import (
     PRINCIPAL_COMPONENTS,
     ShiftSettings,
-    knn_distance,
-    mahalanobis_distance,
+    distances,
     make_sets,
     predict_sets,
     principal_components,
@@ -92,7 +91,7 @@ def test_no_view_of_an_object_that_is_held_out_is_trained_on(objects, embedded):
 def test_knn_is_the_mean_over_the_nearest_in_standardized_features():
     train, query = np.array([[0.0], [1.0], [2.0], [3.0]]), np.array([[1.0], [13.0]])
     deviation = np.std(train)
-    assert knn_distance(train, query, neighbours=2) == pytest.approx([0.5 / deviation, 10.5 / deviation])
+    assert distances(train, query, 2)[:, 0] == pytest.approx([0.5 / deviation, 10.5 / deviation])
 
 
 def test_mahalanobis_of_many_samples_is_that_of_their_covariance():
@@ -100,7 +99,7 @@ def test_mahalanobis_of_many_samples_is_that_of_their_covariance():
     train, query = RANDOM.normal(size=(20000, 2)) @ mixing.T, RANDOM.normal(size=(5, 2)) * 3
     precision = np.linalg.inv(mixing @ mixing.T)
     expected = np.sqrt(np.einsum("sf,fg,sg->s", query, precision, query))
-    assert mahalanobis_distance(train, query) == pytest.approx(expected, rel=0.05)
+    assert distances(train, query, 10)[:, 1] == pytest.approx(expected, rel=0.05)
 
 
 def test_principal_components_keep_what_varies_and_learn_from_the_training_samples_alone():
