@@ -4,8 +4,9 @@ Each epoch draws new points from every cloud. Any other augmentation would erase
 """
 
 import hashlib
+import zipfile
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from copy import deepcopy
 from dataclasses import asdict
 from pathlib import Path
@@ -16,10 +17,11 @@ import torch
 from torch import nn
 
 from gpca.encoders.registry import EncoderSettings, make_encoder
-from gpca.encoders.tensor_file import read_tensors, write_tensors
 from gpca.errors import InputError
+from gpca.io.array_tree import require_whole
 from gpca.io.arrays import require_numbers
-from gpca.io.files import Axes, require_axes, require_file
+from gpca.io.files import Axes, require_axes, require_file, whole_file
+from gpca.numerals import LARGEST_NUMBER
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.portable import Adam, one_cycle
@@ -241,6 +243,43 @@ def _resume(checkpoint: Path | None, identity: str, state: dict) -> list[dict]:
     for name, part in state.items():
         part.load_state_dict(content[name])
     return content["curve"]
+
+
+def read_tensors(path: str | Path) -> Any:
+    """Return the content of a file of torch.save, on the CPU; ValueError for what is implausible, torch has others."""
+    with zipfile.ZipFile(path) as archive:
+        require_whole(archive, Path(path))
+    content = torch.load(path, weights_only=True, map_location="cpu")
+    for name, tensor in _tensors(content):
+        if tensor.layout != torch.strided or tensor.device.type != "cpu" or tensor.is_quantized or tensor.is_complex():
+            raise ValueError(f"'{name}' is a tensor of an unsupported kind")
+        if tensor.numel() * tensor.element_size() > tensor.untyped_storage().nbytes():
+            raise ValueError(f"'{name}' claims to be larger than its data in the file")
+        # gpytorch stores the bounds of its parameters, which may be infinite.
+        if tensor.is_floating_point() and not name.endswith("_bound") and not (tensor.abs() <= LARGEST_NUMBER).all():
+            raise ValueError(f"'{name}' contains NaN, infinity or numbers above {LARGEST_NUMBER:.0e}")
+    return content
+
+
+def write_tensors(path: str | Path, content: object) -> None:
+    """Write a file, complete or not at all."""
+    # Given a path, torch.save writes its name into the file; here that would be the temporary one.
+    with whole_file(path) as partial, partial.open("wb") as file:
+        torch.save(content, file)
+
+
+def _tensors(content: object) -> Iterator[tuple[str, torch.Tensor]]:
+    """Yield every tensor with its name; a list may contain itself, so each is visited once."""
+    seen: set[int] = set()
+    waiting = [("", content)]
+    while waiting:
+        name, part = waiting.pop()
+        if isinstance(part, torch.Tensor):
+            yield name, part
+        elif isinstance(part, Mapping | list | tuple) and id(part) not in seen:
+            seen.add(id(part))
+            parts = part.items() if isinstance(part, Mapping) else enumerate(part)
+            waiting += [(f"{name}.{key}" if name else str(key), inner) for key, inner in parts]
 
 
 def write_weights(path: str | Path, model: Classifier, axes: Axes) -> None:

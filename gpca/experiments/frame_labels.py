@@ -57,7 +57,7 @@ EXPERIMENT = Experiment(
 
 LEARN = Step(
     name="learn_on_frames",
-    run="gpca.steps.frame_labels",
+    run="gpca.steps.active_learning:learn_on_frames",
     inputs={
         "registrations": "registrations/{frames}/seed{seed}.npz",
         "embeddings": "embeddings/{frames}/{*frame_label_backbone}/none/seed{seed}.npz",

@@ -1,24 +1,37 @@
-"""Steps ``embed_without`` and ``learn_actively``: encoders that never saw a concept, and learning curves of it."""
+"""The steps of active learning: encoders that never saw a concept, and learning curves of it, also on depth frames."""
 
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from gpca.active_learning.acquisition import STREAMS, strategies
 from gpca.active_learning.curves import POOL_COLUMNS, STREAM_COLUMNS, write_curves
 from gpca.active_learning.retraining import Retraining, learn
-from gpca.active_learning.rounds import initial_gpc, make_task, rounds
-from gpca.active_learning.settings import ActiveLearningSettings, RareSettings, StreamSettings, rare_setting
+from gpca.active_learning.rounds import Embedded, initial_gpc, make_task, rounds
+from gpca.active_learning.settings import (
+    ALL_LABELS,
+    PAIR,
+    ActiveLearningSettings,
+    FrameLabelSettings,
+    RareSettings,
+    RetrainingSettings,
+    StreamSettings,
+    rare_setting,
+)
 from gpca.active_learning.stream import run_stream
 from gpca.encoders.registry import EncoderSettings
 from gpca.errors import require_known
+from gpca.explainers.pair_classifier import NormalizedFeatures
 from gpca.io.arrays import save_arrays
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.pairs.dataset import Registrations, load_embeddings, read_embedding
+from gpca.pairs.distances import describe_registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
-from gpca.settings import read_settings
+from gpca.settings import fields_of, read_settings
 
 NEW = "overlap"  # the paper's new concept, also learned where it is rare
 COMPARED = ("random", "bald_kmeans")  # strategies of the paper's Table III
@@ -80,3 +93,48 @@ def learn_actively(job: Job) -> None:
                     curves[strategy][setting, NEW] = learned.steps
         for strategy, path in zip(job.strategies, job.out, strict=True):
             write_curves(path, curves[strategy], STREAM_COLUMNS if strategy in STREAMS else POOL_COLUMNS)
+
+
+def learn_on_frames(job: Job) -> None:
+    """Learn each new concept on depth frames, from the embeddings of backbones and from the pair."""
+    inputs = [job.registrations, *job.embeddings]
+    axes = (job.source, job.seed)
+    with record_provenance(job.out, inputs, job.settings, seed=job.seed):
+        settings = read_settings(FrameLabelSettings, job.section("frame_labels"))
+        budget = rounds_of(settings, job.section("active_learning").get("rare") or {})
+        start = ActiveLearningSettings(initial=settings.initial)
+        curves: dict[str, dict] = {strategy: {} for strategy in job.strategies}
+        for name, samples in progress(_embedded(job, settings.points), f"labels of {job.source}"):
+            for concept in settings.held_out:
+                task = make_task(samples, concept, start, *axes, new_share=settings.share)
+                retraining = Retraining(task, budget.gpc, *axes, name)
+                for strategy in job.strategies:
+                    if strategy == ALL_LABELS:  # before any label, and after those of the whole pool
+                        queries: list[list[int]] = [[], list(range(len(task.pool)))]
+                        curve = [retraining.look(retraining.fit(queried, None), queried) for queried in queries]
+                    else:
+                        curve = learn(retraining, strategy, budget, settings.targets, *axes, name).steps
+                    curves[strategy][name, concept] = curve
+        for strategy, path in zip(job.strategies, job.out, strict=True):
+            write_curves(path, curves[strategy], POOL_COLUMNS)
+
+
+def rounds_of(settings: FrameLabelSettings, rare: Mapping[str, Any]) -> RetrainingSettings:
+    """Rounds as those of a concept that is rare on whole objects, with the budget of frames."""
+    shared = fields_of(rare, RetrainingSettings)
+    return read_settings(RetrainingSettings, shared | {"labels": settings.labels, "least": settings.least})
+
+
+def _embedded(job: Job, points: int) -> Iterator[tuple[str, Embedded]]:
+    """Name of each embedding, and the samples in it."""
+    registrations = Registrations.load(job.registrations, (job.source, job.seed))
+
+    def samples(h_S_d: np.ndarray) -> Embedded:
+        return Embedded(h_S_d, registrations.concept, registrations.split)
+
+    of_backbones = [load_embeddings(path, registrations, {"h": ("S", "d")})["h"] for path in job.embeddings]
+    yield from zip(job.backbones, map(samples, of_backbones), strict=True)
+    axes = (job.source, job.seed)
+    measured_S_F = describe_registrations(registrations, *axes, points=points)["relations"]
+    normalized = NormalizedFeatures(*axes, "frame_labels").fit(measured_S_F[registrations.rows("train")])
+    yield PAIR, samples(normalized(measured_S_F))

@@ -116,7 +116,7 @@ STEPS = {  # module -> files that it depends on, and some that it does not
         {"gpca/classifier/latents.py", "gpca/active_learning/stream.py", "gpca/active_learning/retraining.py"},
         {"gpca/explainers/interface.py", "gpca/encoders/training.py"},
     ),
-    "gpca.steps.frame_labels": (
+    "gpca.steps.active_learning:learn_on_frames": (
         {"gpca/active_learning/retraining.py", "gpca/pairs/distances.py"},
         {"gpca/explainers/interface.py", "gpca/active_learning/stream.py", "gpca/frames/synthesis.py"},
     ),

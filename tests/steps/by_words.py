@@ -13,7 +13,7 @@ from gpca.process.code_files import ROOT
 from gpca.process.processor import THREAD_VARIABLES
 
 STEPS = {  # module of gpca.steps -> the steps that it has, functions of their names; or name=function
-    "active_learning": "active_learning=learn_actively without=embed_without",
+    "active_learning": "active_learning=learn_actively without=embed_without frame_labels=learn_on_frames",
     "causes": "causes describe reenact train_on_causes model",
     "control_samples": "train_control=train",
     "controls": "controls=explain",
@@ -26,18 +26,17 @@ STEPS = {  # module of gpca.steps -> the steps that it has, functions of their n
     "readings.subsets": "retrain",
     "repair": "attempt",
     "scan_causes": "scan_causes=measure diagnose_scans=diagnose",
-    "scans": "draw_scans",
+    "scans": "draw_scans register_scans=register",
     "shift": "shift learners=fit_learners",
     "shifts": "draw_shift=draw observe_shift=observe diagnose_shifts=diagnose",
 }
 MODULES = {  # modules with a function ``run``
-    **{name: f"gpca.steps.{name}" for name in ("exchange", "frame_labels", "guarantee", "kernel_grid")},
+    **{name: f"gpca.steps.{name}" for name in ("exchange", "guarantee", "kernel_grid")},
     "runtime": "gpca.steps.runtime",
     "estimate": "gpca.steps.estimates",
     "recover": "gpca.steps.recovery",
     "register_methods": "gpca.steps.registration_trials",
     "repair_verdicts": "gpca.steps.repair_verdicts",
-    "register_scans": "gpca.steps.scans:register",
 }
 for module, steps in STEPS.items():
     for step in steps.split():

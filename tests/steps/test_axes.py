@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from gpca.encoders.tensor_file import write_tensors
+from gpca.encoders.training import write_tensors
 from gpca.io.arrays import save_arrays
 from gpca.pairs.dataset import Registrations
 from tests.steps.by_words import main
