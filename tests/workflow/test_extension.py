@@ -34,7 +34,7 @@ def meshes(tmp_path):
     return folder
 
 
-def test_a_folder_of_meshes_and_a_rule_of_an_own_source_become_rows(finished, planned, meshes):
+def test_a_folder_of_meshes_and_a_rule_of_an_own_source_are_planned_like_any_other_source(finished, planned, meshes):
     finished.append("config/sources.yaml", block("config/sources.yaml", "my_parts").removeprefix("sources:\n"))
     data_dir = ("--config", f"data_dir={meshes.parent}")
     again = finished.dry_run("all", *SMOKE, *data_dir)
@@ -61,51 +61,34 @@ def test_a_folder_of_meshes_and_a_rule_of_an_own_source_become_rows(finished, pl
     assert files_of("my_parts", again) == files_of("torus", again) == files_of(OLD_ROW, planned)
     assert again.jobs["torus"] == 1
 
-    table2 = "results/smoke/tables/table2_per_concept"
-    new_alone = ("seeds=[0]", "sources={coffee_cup: false, ycb: false, torus: false}",
-                 "figures={source: my_parts}", "kernel_grid={sources: [my_parts]}",
-                 "cause_shifts={sources: [my_parts]}",
-                 "exchange={sources: [my_parts]}", "recovery={objects: my_parts}")  # fmt: skip
-    finished.snakemake("-j2", f"{table2}.md", *SMOKE, *data_dir, *new_alone)
-    finished.snakemake("-j1", "results/smoke/objects/torus.npz", *SMOKE, *data_dir)
-    parts, torus = (
-        ObjectClouds.load(finished.folder / f"results/smoke/objects/{name}.npz") for name in ("my_parts", "torus")
-    )
+    made = [f"results/smoke/objects/{name}.npz" for name in ("my_parts", "torus")]
+    finished.snakemake("-j2", *made, *SMOKE, *data_dir)
+    parts, torus = (ObjectClouds.load(finished.folder / path) for path in made)
     assert parts.names == ("brick", "cone", "ring")
     assert parts.diameters_m[0] == pytest.approx(np.linalg.norm((0.04, 0.07, 0.10)))
     assert torus.diameters_m[0] == pytest.approx(0.11, rel=0.01)
-    assert (finished.folder / f"{table2}.md").read_text().count("\n| My parts |") == 2
-    with (finished.folder / f"{table2}.csv").open() as file:
-        means = {row["source"]: float(row["mean"]) for row in csv.DictReader(file) if row["concept"] == "all"}
-    assert 0 < means["my_parts"] <= 100
 
 
-def test_a_table_of_the_docs_is_a_function(finished):
-    file = "gpca/experiments/abstentions.py"
-    (finished.folder / file).write_text(block(file))
-    assert finished.dry_run("all", *SMOKE).jobs == {"abstentions": 1, "page": 1}
-
-    finished.snakemake("-j1", "abstentions", *SMOKE)
-    table = (finished.folder / "results/smoke/tables/abstentions.md").read_text()
-    assert "| GP-CA (trained longer) | 0.0 |" in table
-
-
-def test_an_experiment_of_the_docs_is_one_short_file_and_a_line_of_the_config(finished):
-    file = "gpca/experiments/point_counts.py"
+def test_a_table_of_the_docs_is_a_function_and_an_experiment_a_short_file_with_a_line_of_the_config(finished):
+    file, table = "gpca/experiments/point_counts.py", "gpca/experiments/abstentions.py"
     text = block(file, "EXPERIMENT")
     assert len(text.splitlines()) <= 62  # with the line that names the file
     (finished.folder / file).write_text(text)
+    (finished.folder / table).write_text(block(table))
     finished.append("config/config.yaml", block("config/config.yaml", "point_counts"))
-    assert finished.dry_run("all", *SMOKE).jobs == {"point_counts": 1, "observed_points": 1, "page": 1}
+    new = dict.fromkeys(("abstentions", "point_counts", "observed_points"), 1)
+    assert finished.dry_run("all", *SMOKE).jobs == new | {"page": 1}
 
-    finished.snakemake("-j1", "observed_points", *SMOKE)
+    finished.snakemake("-j2", "abstentions", "observed_points", *SMOKE)
+    table = (finished.folder / "results/smoke/tables/abstentions.md").read_text()
+    assert "| GP-CA (trained longer) | 0.0 |" in table
     with (finished.folder / "results/smoke/tables/observed_points.csv").open() as file:
         means = {(row["source"], row["concept"]): float(row["mean"]) for row in csv.DictReader(file)}
     assert all(means[source, "overlap"] < means[source, "noise"] for source in ("coffee_cup", "ycb"))
-    # A key that the table did not read leaves it as it is; one that it did makes it again.
-    assert (
-        "observed_points" not in finished.dry_run("all", *SMOKE, "--config", "run=smoke", "figures={source: ycb}").jobs
-    )
+    # A key that a table did not read leaves it as it is; figures of another source are drawn alone.
+    planned = finished.dry_run("all", *SMOKE, "--config", "run=smoke", "figures={source: ycb}")
+    assert {"fig3_concepts", "causes_example", "fig2_overview"} < planned.jobs.keys()
+    assert not [path for path in planned.outputs if "/tables/" in path or path.endswith((".npz", ".csv"))]
 
     wrong = finished.snakemake("-n", "all", *SMOKE, "--config", "point_counts={splits: test}", check=False)
     assert "config key point_counts.splits: unknown; did you mean split?" in wrong.stderr

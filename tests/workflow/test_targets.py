@@ -146,7 +146,6 @@ def test_an_explainer_says_the_same_as_a_learner(smoke, name):
 def test_a_finished_run_has_nothing_to_do_nor_has_one_with_a_touched_but_unchanged_module(finished):
     (finished.folder / "gpca/classifier/gpc.py").touch()
     assert not finished.dry_run(*SMOKE).jobs
-    assert not finished.dry_run("smoke").jobs
 
 
 def test_a_changed_setting_reruns_what_depends_on_it(finished):
@@ -164,13 +163,6 @@ def test_a_changed_setting_reruns_what_depends_on_it(finished):
         "diagnose",
     }
     assert not [path for path in planned.outputs if "predictions/" in path and "gpca_paper" in path]
-
-
-def test_a_figure_of_another_source_is_drawn_alone(finished):
-    (finished.folder / "mine.yaml").write_text(json.dumps({"figures": {"source": "ycb"}}))
-    planned = finished.dry_run(*SMOKE, "mine.yaml")
-    assert {"fig3_concepts", "causes_example", "fig2_overview"} < planned.jobs.keys()
-    assert not [path for path in planned.outputs if "/tables/" in path or path.endswith((".npz", ".csv"))]
 
 
 def test_every_table_figure_and_stage_is_a_target_by_name(project):

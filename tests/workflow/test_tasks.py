@@ -25,11 +25,11 @@ ELSEWHERE = {
     "install": ("pip install .", "tests/test_package.py::test_the_command_runs_anywhere"),
     "make one": (
         "snakemake -j2 results/default/tables/table2_per_concept.md",
-        "tests/workflow/test_extension.py::test_a_folder_of_meshes_and_a_rule_of_an_own_source_become_rows",
+        "tests/workflow/test_extension.py::test_a_folder_of_meshes_and_a_rule_of_an_own_source_are_planned_like_any_other_source",
     ),
     "use your own meshes": (
         "snakemake -j2 results/default/tables/table2_per_concept.md --config data_dir=/data",
-        "tests/workflow/test_extension.py::test_a_folder_of_meshes_and_a_rule_of_an_own_source_become_rows",
+        "tests/workflow/test_extension.py::test_a_folder_of_meshes_and_a_rule_of_an_own_source_are_planned_like_any_other_source",
     ),
     "add an explainer": ('EXPLAINERS = {"nearest_quality"', "tests/test_adding.py::test_an_explainer"),
     "continue": (
