@@ -34,7 +34,7 @@ def meshes(tmp_path):
     return folder
 
 
-def test_a_folder_of_meshes_and_a_rule_of_an_own_source_are_planned_like_any_other_source(finished, planned, meshes):
+def test_a_folder_of_meshes_and_a_rule_of_an_own_source_are_planned_like_others(finished, planned, meshes):
     finished.append("config/sources.yaml", block("config/sources.yaml", "my_parts").removeprefix("sources:\n"))
     data_dir = ("--config", f"data_dir={meshes.parent}")
     again = finished.dry_run("all", *SMOKE, *data_dir)

@@ -25,11 +25,11 @@ ELSEWHERE = {
     "install": ("pip install .", "tests/test_package.py::test_the_command_runs_anywhere"),
     "make one": (
         "snakemake -j2 results/default/tables/table2_per_concept.md",
-        "tests/workflow/test_extension.py::test_a_folder_of_meshes_and_a_rule_of_an_own_source_are_planned_like_any_other_source",
+        "tests/workflow/test_tasks.py::test_a_dataset_of_ones_own_becomes_a_row_in_a_folder_beside_a_clone",
     ),
     "use your own meshes": (
         "snakemake -j2 results/default/tables/table2_per_concept.md --config data_dir=/data",
-        "tests/workflow/test_extension.py::test_a_folder_of_meshes_and_a_rule_of_an_own_source_are_planned_like_any_other_source",
+        "tests/workflow/test_tasks.py::test_a_dataset_of_ones_own_becomes_a_row_in_a_folder_beside_a_clone",
     ),
     "add an explainer": ('EXPLAINERS = {"nearest_quality"', "tests/test_adding.py::test_an_explainer"),
     "continue": (
