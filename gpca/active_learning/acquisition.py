@@ -1,8 +1,4 @@
-"""Acquisition strategies by name: functions that pick the samples of a pool to label next (paper Sec. III-C).
-
-A strategy gets the pool, the batch size B and a random generator, and returns rows of the pool, best first. Entropy,
-margin, BADGE, CoreSet and TypiClust are scikit-activeml's; BALD uses the GP's posterior instead of an ensemble.
-"""
+"""Acquisition strategies by name: functions that pick the samples of a pool to label next (paper Sec. III-C)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -174,10 +170,7 @@ def _with_labeled(strategy, pool: Pool, batch: int) -> np.ndarray:
 
 
 def power_bald(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
-    """Draw without replacement in proportion to BALD (Kirsch et al. 2023, β = 1) by Gumbel top-k.
-
-    In their comparison, it equals BatchBALD without joint entropies.
-    """
+    """Draw without replacement in proportion to BALD (Kirsch et al. 2023, β = 1) by Gumbel top-k."""
     return top(np.log(np.maximum(pool.bald_N, 1e-12)) + random.gumbel(size=len(pool.bald_N)), batch)
 
 

@@ -164,10 +164,7 @@ class Question:
 
 
 class Session:
-    """A growing set of labels and the classifier trained on them; new concepts extend its classes.
-
-    The classifier learns the labels of `start` and of the file. With a trained one to continue, `start` may be empty.
-    """
+    """A growing set of labels and the classifier trained on them; new concepts extend its classes."""
 
     def __init__(
         self,

@@ -1,7 +1,4 @@
-"""Learning a new concept with a full fit of the classifier in every round, as in the paper (Sec. III-C, IV-C).
-
-In :mod:`gpca.active_learning.rounds`, labels only update the posterior, which takes a hundredth of the time.
-"""
+"""Learning a new concept with a full fit of the classifier in every round, as in the paper (Sec. III-C, IV-C)."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass

@@ -1,8 +1,4 @@
-"""Learning a new concept from few labels (paper Sec. III-C and IV-C).
-
-A GPC trained on the other concepts gets a pool with all. In rounds, a strategy picks B samples, their labels are added
-and the GPC is retrained; the learning curve is its accuracy on the test samples over the number of labels.
-"""
+"""Learning a new concept from few labels (paper Sec. III-C and IV-C)."""
 
 from __future__ import annotations
 
@@ -78,10 +74,7 @@ def make_task(
     *axes: object,
     new_share: float | None = None,
 ) -> LabelingTask[np.ndarray]:
-    """Split the training samples into initial ones, equally many of each other concept, and the pool of the rest.
-
-    `new_share` is that of the held-out concept in the pool, if there are enough samples; None keeps all.
-    """
+    """Split the training samples into initial ones, equally many of each other concept, and the pool of the rest."""
     train = generator(*axes, "initial", held_out).permutation(samples.rows("train"))
     concept_S = samples.concept
     others = [concept for concept in CONCEPTS if concept != held_out]
@@ -104,10 +97,7 @@ def make_task(
 
 
 def initial_gpc(task: LabelingTask[np.ndarray], settings: ActiveLearningSettings, *axes: object) -> GPC:
-    """Fit the GPC on the initial labels, with scaling, inducing inputs and lengthscale initialized on the pool too.
-
-    Otherwise, no inducing input would be near the new concept.
-    """
+    """Fit the GPC on the initial labels, with scaling, inducing inputs and lengthscale initialized on the pool too."""
     gpc = GPC(CONCEPTS, settings.gpc, *axes, "active_learning", task.held_out)
     gpc.fit(task.initial.h, task.initial.concept_N, task.labeled()[0])
     gpc.level()

@@ -1,9 +1,4 @@
-"""Active learning on a stream: samples arrive one at a time, and the learner asks for some of the labels.
-
-The paper's loop (Sec. III-C and Fig. 4): the classifier names the concept of each sample; if its uncertainty exceeds a
-threshold and the budget allows, it asks for the label and learns it. The learner of CLEVER (2025), which the paper
-cites, uses the same embeddings, initial samples and budget.
-"""
+"""Active learning on a stream: samples arrive one at a time, and the learner asks for some of the labels."""
 
 import math
 from copy import copy

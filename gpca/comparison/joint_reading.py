@@ -106,12 +106,7 @@ def search(
     deals: int,
     shown: int = 20,
 ) -> Found:
-    """Search every joint reading of a grid, which holds the values of every choice, the protocol's first.
-
-    Args:
-        printed: the numbers and others, which take their places in as many permutations as `deals`.
-        measured: tidy rows of one source that stands for theirs, with `table` as :func:`part_name` has it.
-    """
+    """Search every joint reading of a grid, which holds the values of every choice, the protocol's first."""
     shape = tuple(len(grid[choice]) for choice in CHOICES)
     closes = []  # whether each number's values are close to each printed one (P, …), with an axis for every choice
     for number in numbers:

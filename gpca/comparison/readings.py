@@ -26,12 +26,7 @@ READING_COLUMNS = (
 def judge_readings(
     numbers: Sequence[Number], comparison: Frame, readings: Frame, tolerances: Mapping[str, Tolerance]
 ) -> Frame:
-    """Return `READING_COLUMNS`, a row per printed number and reading that has a value in its place.
-
-    The distance is in units of the close tolerance, in logarithms for a ratio; the chance is that of :func:`chance_of`.
-    In the tidy rows of ``readings.csv``, `table` holds the group and the values of its choices, joined by /, and the
-    other columns are those of the counterpart in its file.
-    """
+    """Return `READING_COLUMNS`, a row per printed number and reading that has a value in its place."""
     import pandas as pd
 
     judged = comparison.set_index(NUMBER)[["reproduced", "verdict"]]
@@ -136,10 +131,7 @@ def summarize(judged: Frame) -> dict[tuple[str, str, str], dict[str, GroupSummar
 
 
 def sentence(groups: Mapping[str, GroupSummary], words: ModuleType) -> str:
-    """Return the sentences of a reason about the readings, one for each group.
-
-    The words are titles: ``group(name)`` of what a group leaves open, ``reading(group, name)`` of a reading's choices.
-    """
+    """Return the sentences of a reason about the readings, one for each group."""
     sentences = []
     for name, of in groups.items():
         span, nearest = f"{of.least:.3g} to {of.most:.3g}", f"{of.value:.3g} ({words.reading(name, of.nearest)})"

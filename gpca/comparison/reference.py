@@ -153,10 +153,7 @@ def device_of(folder: Path, file: str) -> str:
 
 
 def read_means(path: Path, samples_of_source: Mapping[str, int] = MappingProxyType({})) -> dict[tuple[str, ...], Mean]:
-    """Return the means over the seeds in a tidy file or a table, without times.
-
-    `samples_of_source` counts the test samples of all seeds, for tidy files that do not.
-    """
+    """Return the means over the seeds in a tidy file or a table, without times."""
     require_file(path, "no such file", REMEDY, LARGEST_BYTES)
     table = read_csv(path, (), others=ANY)
     heads, rows, means = list(table), table.to_dict("records"), {}

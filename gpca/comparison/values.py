@@ -1,9 +1,4 @@
-"""The run's value beside each printed number: its interval over seeds and samples, and over clusters of samples.
-
-The first holds for the given objects and decides a verdict. The other shows how much the choice of objects matters, of
-which those of one family or scene are alike (:mod:`gpca.objects.canonical`); it needs predictions of single samples,
-which a run keeps for shares of samples only.
-"""
+"""The run's value beside each printed number: its interval over seeds and samples, and over clusters of samples."""
 
 from __future__ import annotations
 

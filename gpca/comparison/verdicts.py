@@ -124,10 +124,7 @@ def verdict_of(printed: Printed, reproduced: Reproduced, tolerance: Tolerance) -
 
 
 def repeats_needed(printed: Printed, reproduced: Reproduced, tolerance: Tolerance, unit: Unit) -> int | None:
-    """Return the fewest repeats of the same mean and spread that are not inconclusive; None if no number is.
-
-    The more repeats, the narrower the interval, so the number is found by bisection.
-    """
+    """Return the fewest repeats of the same mean and spread that are not inconclusive; None if no number is."""
 
     def decides(n: int) -> bool:
         return verdict_of(printed, reproduced.repeated(n, unit), tolerance) != INCONCLUSIVE
@@ -158,12 +155,9 @@ def compare(
     hardware: str = "",
     clusters: Mapping[Counterpart, ShareDraws] | None = None,
 ) -> Frame:
-    """Return `COMPARISON_COLUMNS`, a row per printed number, in its unit.
+    """Return `COMPARISON_COLUMNS`, a row per printed number, in its unit, given the results by the name of the file.
 
-    Args:
-        results: by the name of the file, those that reasons cite among them.
-        objects: source -> ``{"title": str, "stand_in": bool}``; "model" is what the explained model was trained on.
-        hardware: the machine of the measured times, where their file does not say.
+    Objects are source -> ``{"title": str, "stand_in": bool}``; the hardware is where the file of times does not say.
     """
     import pandas as pd
 

@@ -1,8 +1,4 @@
-"""The PointNet family: PointNet without transformer networks, PointNet++, and PointNeXt.
-
-All embed clouds (B, N, 3) in the target's frame, in diameters, to (B, d). Nothing centers, scales or turns the cloud,
-which would erase the concepts. `width` is that of the first layer; all others grow with it.
-"""
+"""The PointNet family: PointNet without transformer networks, PointNet++, and PointNeXt."""
 
 import torch
 from torch import nn

@@ -1,7 +1,4 @@
-"""Training an encoder with a head over the concepts (paper Sec. III-A), its files, and the embeddings.
-
-Each epoch draws new points from every cloud. Any other augmentation would erase a concept.
-"""
+"""Training an encoder with a head over the concepts (paper Sec. III-A), its files, and the embeddings."""
 
 import hashlib
 import zipfile

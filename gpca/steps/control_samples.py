@@ -143,10 +143,7 @@ def encode(
     encoder: EncoderSettings,
     checkpoint: Path | None = None,
 ) -> tuple[dict[str, np.ndarray], list[dict[str, float]]]:
-    """Return arrays of embeddings by an encoder that is trained like the paper's except for the control, and its curve.
-
-    With matched density every draw from a whole cloud has a random number of points.
-    """
+    """Return arrays of embeddings by an encoder that is trained under the control, and its curve."""
     from gpca.encoders.training import embed, train_encoder
 
     if control == "density":

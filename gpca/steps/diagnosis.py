@@ -193,10 +193,7 @@ class World:
         self._prepared: dict[tuple[str, str], list[tuple[Registrations, Registrations]]] = {}
 
     def prepare(self, name: str, learned_from: str = OBJECTS) -> list[tuple[Registrations, Registrations]]:
-        """Return what an explainer learns from, and what it is asked about; the same twice if not objects.
-
-        Descriptors and re-enactments of all sources are one set; embeddings are by an encoder for each source.
-        """
+        """Return what an explainer learns from, and what it is asked about; the same twice if not objects."""
         from gpca.encoders.training import embed, load_model
 
         reads = explainer_entry(name, CAUSES).reads

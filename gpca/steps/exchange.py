@@ -180,10 +180,7 @@ def labeled(frame: Frame, labels: tuple[str, ...], failure_S: np.ndarray) -> Fra
 def registered_by(
     registrations: Registrations, methods: Mapping[str, Mapping], source: str, seed: int, points: int
 ) -> dict[str, tuple[Registrations, np.ndarray]]:
-    """Return the registrations by each method, and why each failed (S,), empty if it did not.
-
-    All methods get the same thinned clouds; the whole observed cloud moves to the resulting pose, even of a failure.
-    """
+    """Return the registrations by each method, and why each failed (S,), empty if it did not."""
     made = {name: make_method(name, entry) for name, entry in methods.items()}
     outcomes: dict[str, list] = {name: [] for name in made}
     for row in progress(range(len(registrations)), f"registrations by other methods of {source}, seed {seed}"):

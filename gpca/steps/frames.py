@@ -30,10 +30,7 @@ SHOWN_METHOD = "point_to_point"  # ICP as in the registrations that are shown
 
 
 def scenes(job: Job) -> None:
-    """Lay table-top scenes of procedural objects, or of datasets' models, and render them -> a BOP dataset.
-
-    Models that cannot be rendered or stood on a table are skipped, with a line on stderr.
-    """
+    """Lay table-top scenes of procedural objects, or of datasets' models, and render them -> a BOP dataset."""
     from gpca.frames import dataset
     from gpca.frames.rgbd_scene import SceneSettings, stable_poses, write_scenes
     from gpca.objects import procedural

@@ -109,10 +109,7 @@ def learn_from_more(job: Job) -> None:
 def learning_curve(
     pool: LabeledSamples, tested: LabeledSamples, truth: Causes, settings: CurveSettings, source: str, seed: int
 ) -> Frame:
-    """Return `CURVE_COLUMNS` for each learner, size and order, and a row of the truth from other starts.
-
-    An order is a permutation of the pool, which lacks the families that are tested; larger sizes have no row.
-    """
+    """Return `CURVE_COLUMNS` for each learner, size and order, and a row of the truth from other starts."""
     import pandas as pd
 
     sizes = [size for size in sorted(settings.sizes) if size <= len(pool)]

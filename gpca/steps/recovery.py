@@ -180,11 +180,7 @@ def save_example(
     settings: LoopSettings,
     axes: Axes,
 ) -> None:
-    """Write the npz: of the ``first`` and the ``next`` view the image and silhouettes; scores, errors; viewpoints.
-
-    Silhouettes are those of the visible part of the object, of the whole object, and of the model where ICP put it.
-    Viewpoints have the share of the model's surface that was expected to have been seen after them.
-    """
+    """Write the npz: of the ``first`` and the ``next`` view the image and silhouettes; scores, errors; viewpoints."""
     episode = next(e for e in episodes if e.number == choose_example(rows))
     shown = rows[(rows["episode"] == episode.number) & (rows["step"] == 1)]
     shown = shown[shown["policy"] == "gpca"].iloc[0] if (shown["policy"] == "gpca").any() else shown.iloc[0]

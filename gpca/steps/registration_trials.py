@@ -1,7 +1,4 @@
-"""Step ``register_methods``: the test pairs of registrations, registered by every method.
-
-Local methods start twice: at the pair's initial pose, and at the pose of a global method.
-"""
+"""Step ``register_methods``: the test pairs of registrations, registered by every method."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace

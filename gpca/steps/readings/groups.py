@@ -1,7 +1,4 @@
-"""The groups of readings by name: the choices that the paper leaves open, the files and the function of each.
-
-A reading is a combination of the values of a group's choices. ``config/readings.yaml`` has the values that are tried.
-"""
+"""The groups of readings by name: the choices that the paper leaves open, the files and the function of each."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -54,10 +54,7 @@ def shap(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
 
 
 def magnitudes(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
-    """Accuracies of SHAP and of local sensitivity analysis by how far each knob is turned.
-
-    SHAP turns it that far or not at all; sensitivity analysis divides by that step, in units of the knob's range.
-    """
+    """Accuracies of SHAP and of local sensitivity analysis by how far each knob is turned."""
     settings = run_files.uncertainty()
     turned_R_3 = np.array([[reading[name] for name in Knobs._fields] for reading in readings])
     for source, seed, pairs in _pairs(run_files, settings.starts, "knobs"):
@@ -67,10 +64,7 @@ def magnitudes(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row
 
 
 def accuracies_of_magnitudes(pairs: Iterable[Pair], turned_R_3: np.ndarray, floor: float) -> dict[str, np.ndarray]:
-    """Accuracies (R,) of SHAP and of local sensitivity analysis, by the settings to which the knobs are turned.
-
-    A spread is no uncertainty whose variance is below the floor.
-    """
+    """Accuracies (R,) of SHAP and of local sensitivity analysis, by the settings to which the knobs are turned."""
     concept_S, worths = [], []
     for concept, runs in pairs:
         concept_S.append(concept)

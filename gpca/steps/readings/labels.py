@@ -1,7 +1,4 @@
-"""Table III under other readings of the pool, of the rounds of labels, of an epoch, and of the classifier.
-
-The paper does not say whether a retraining starts anew, nor by which samples the inputs are scaled.
-"""
+"""Table III under other readings of the pool, of the rounds of labels, of an epoch, and of the classifier."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -28,11 +25,7 @@ STRATEGIES = ("bald_kmeans", "random")
 
 
 def pool(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
-    """Labels and epochs to the target under each reading, by BALD with k-means and by random choice.
-
-    Further labels move the posterior alone, as the classifier of the protocol would take hours, and epochs are the
-    passes of all rounds.
-    """
+    """Labels and epochs to the target under each reading, by BALD with k-means and by random choice."""
     base, target = base_settings(run_files)
     for source, seed, registrations, _ in run_files.in_distribution():
         started: dict[tuple, tuple[LabelingTask, GPC] | None] = {}
@@ -111,10 +104,7 @@ def passes_to(
 
 
 def classifiers(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
-    """Labels and epochs to the target by the classifier, also by that of the protocol.
-
-    From ``posterior``, further labels move the first classifier's posterior alone.
-    """
+    """Labels and epochs to the target by the classifier, also by that of the protocol."""
     rare, target = rare_settings(run_files)
     for source, seed, registrations, _ in run_files.in_distribution():
         task, axes = judged_task(run_files, registrations, source, seed)

@@ -220,10 +220,7 @@ def diagnostics(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Ro
 
 
 def diagnostics_under(rows: Frame, reading: Reading) -> Values:
-    """ρ, the area and ECE of one learner, by the names of their counterparts; entropy stands for BALD.
-
-    Without any error, or with errors alone, there is no ROC curve, and no value of it.
-    """
+    """ρ, the area and ECE of one learner, by the names of their counterparts; entropy stands for BALD."""
     score_S = rows[reading["score"] if reading["score"] in rows else "entropy"].to_numpy(float)
     wrong_S = wrong(rows)
     values = {

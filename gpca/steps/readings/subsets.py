@@ -1,8 +1,4 @@
-"""GP-CA by severity, and Table VI: accuracies on parts of the samples, by encoders that saw others, from other starts.
-
-The run has the predictions of encoders as published and of ICP from estimators' poses (``real_world.published`` and
-``conditions`` of the config).
-"""
+"""GP-CA by severity, and Table VI: accuracies on parts of the samples, of other encoders, from other starts."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -49,10 +45,7 @@ def thirds(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
 
 
 def third_S(registrations: Registrations) -> np.ndarray:
-    """Third of its concept's samples in which the severity of each sample lies.
-
-    That of a pose error is the mean of the ranks of its angle and its length.
-    """
+    """Third of its concept's samples in which the severity of each sample lies."""
     names_S = np.empty(len(registrations), object)
     pose_S = mean_ranks(registrations.severity_rotation_rad) + mean_ranks(registrations.severity_translation)
     severities = {"noise": registrations.severity_noise, "pose": pose_S, "overlap": registrations.severity_crop}
@@ -74,10 +67,7 @@ def retrained(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]
 
 
 def retrain(job: Job) -> None:
-    """Make the sets of samples of a source and seed within other severities, from the random numbers of the protocol.
-
-    An encoder learns from them as that of the protocol does.
-    """
+    """Make the sets of samples within other severities, from the random numbers of the protocol."""
     from gpca.encoders.registry import EncoderSettings
     from gpca.encoders.training import embedding_by, train_encoder
     from gpca.steps.shift import ShiftSettings, sets_of_encoder
@@ -97,10 +87,7 @@ def retrain(job: Job) -> None:
 
 
 def repeats(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
-    """Accuracies of every backbone and reduction, repeat by repeat, and how concepts are confused.
-
-    A draw of training samples is with replacement, of as many as there are (Efron 1979).
-    """
+    """Accuracies of every backbone and reduction, repeat by repeat, and how concepts are confused."""
     by_seed = {seed: registrations for _, seed, registrations in run_files.loaded()}
     first, methods = next(iter(by_seed)), list(dict.fromkeys(method for _, method, _ in run_files.predictions))
     source = next(iter(run_files.registrations))[0]
@@ -122,10 +109,7 @@ def repeats(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
 
 
 def other_rows(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
-    """Accuracies of the judged rows, or of others in their place, which the run may lack.
-
-    The encoders of the others are as published, or their ICP starts at estimators' poses.
-    """
+    """Accuracies of the judged rows, or of others in their place, which the run may lack."""
     shown = {(source, seed): registrations for source, seed, registrations in run_files.loaded()}
     frames, published = run_files.section("frames"), run_files.section("published")
     for method in frames["methods"]:

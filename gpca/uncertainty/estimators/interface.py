@@ -165,10 +165,7 @@ def inverse_hessian(hessian_6_6: np.ndarray) -> np.ndarray:
 
 
 def intrinsic_frame(points_N_3: np.ndarray) -> np.ndarray:
-    """Return T_target_intrinsic (4×4): a cloud's centroid and principal axes, the longest first.
-
-    An axis points to where the cloud reaches farther, by the sum of cubes, so that like clouds have like frames.
-    """
+    """Return T_target_intrinsic (4×4): a cloud's centroid and principal axes, the longest first."""
     center_3 = points_N_3.mean(axis=0)
     offset_N_3 = points_N_3 - center_3
     axes_3_3 = np.linalg.eigh(np.einsum("ni,nj->ij", offset_N_3, offset_N_3))[1][:, ::-1]

@@ -71,11 +71,7 @@ def langevin(
     step_size: float,
     random: np.random.Generator,
 ) -> np.ndarray:
-    """Return the twists of n chains after the burn-in, all in one (m, 6): x ← x + ½ε M ∇ln p + √(εM) η.
-
-    With the posterior's covariance as preconditioner M, all directions mix alike. The variance comes out too large by
-    about a quarter of ε, `step_size`.
-    """
+    """Return the twists of n chains after the burn-in, all in one (m, 6): x ← x + ½ε M ∇ln p + √(εM) η."""
     root_6_6 = np.linalg.cholesky(preconditioner_6_6)
     x_n_6, visited = start_n_6.copy(), []
     for step in range(steps):

@@ -44,10 +44,7 @@ class Estimates:
         return np.array([next(filter(None, row), "") for row in self.failure[:, :conditions]])
 
     def attach_to(self, registrations: Registrations, rows: np.ndarray, conditions: int, floor: float) -> Registrations:
-        """Return rows of the S registrations with the outcomes of a design attached for explainers, at no cost.
-
-        `rows` have an estimate under each of the first `conditions`; `floor` is ε of the divergence.
-        """
+        """Return rows of the S registrations with the outcomes of a design attached for explainers, at no cost."""
         covariance = self.covariance[rows, :conditions]
         outcomes = {"covariance": covariance, "uncertainty": divergence(covariance[:, :1], covariance, floor)}
         outcomes |= dict.fromkeys(("icp_calls", "seconds", "icp_seconds"), np.zeros(covariance.shape[:2]))
