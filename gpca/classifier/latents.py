@@ -13,6 +13,8 @@ from functools import cache
 import numpy as np
 from scipy.special import softmax
 
+STEP = 0.5  # toward new sites, of their refinement
+
 
 @dataclass(frozen=True)
 class Projection:
@@ -86,7 +88,7 @@ class Sites:
 
 
 def refine(
-    projection: Projection, targets_N: np.ndarray, sites: Sites, iterations: int, tolerance: float, step: float = 0.5
+    projection: Projection, targets_N: np.ndarray, sites: Sites, iterations: int, tolerance: float
 ) -> tuple[Sites, Latents, int]:
     """Maximize the ELBO of the softmax likelihood by natural gradients; each iteration passes once over all labels.
 
@@ -104,8 +106,8 @@ def refine(
             return sites, latents, iteration - 1
         curvature_N_C = p_N_C - np.square(p_Q_N_C).mean(axis=0)
         linear_N_C = wanted_N_C - p_N_C + curvature_N_C * mean_N_C
-        linear_N_C = (1 - step) * sites.linear_N_C + step * linear_N_C
-        sites = Sites(linear_N_C, (1 - step) * sites.precision_N_C + step * curvature_N_C)
+        linear_N_C = (1 - STEP) * sites.linear_N_C + STEP * linear_N_C
+        sites = Sites(linear_N_C, (1 - STEP) * sites.precision_N_C + STEP * curvature_N_C)
         latents, before_N_C = sites.posterior(projection), p_N_C
     return sites, latents, iterations
 
@@ -125,8 +127,8 @@ def expected_log_likelihood(mean_N_C: np.ndarray, deviation_N_C: np.ndarray, tar
 
 
 @cache
-def _normal_points(n_classes: int, log2_points: int = 6) -> np.ndarray:
+def _normal_points(n_classes: int) -> np.ndarray:
     """64 standard normal points (Q, C) from a fixed scrambled Sobol sequence."""
     from scipy.stats import norm, qmc
 
-    return norm.ppf(qmc.Sobol(n_classes, rng=0).random_base2(log2_points))
+    return norm.ppf(qmc.Sobol(n_classes, rng=0).random_base2(6))

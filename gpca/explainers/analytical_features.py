@@ -7,16 +7,16 @@ from gpca.seeds import generator
 
 
 def analytical_features(
-    registrations: Registrations, *axes: object, shape_points: int = 256, neighbors: int = 16, point_count: bool = True
+    registrations: Registrations, *axes: object, shape_points: int = 256, neighbors: int = 16
 ) -> np.ndarray:
-    """Return (N, F): inlier RMSE (of diameters), the features of :func:`compare`, and perhaps the point-count ratio."""
+    """Return (N, F): inlier RMSE (of diameters), the features of :func:`compare`, and the point-count ratio."""
     rows = []
     for i in range(len(registrations)):
         source, target = registrations.cloud(i), registrations.target(i)
         random = generator(*axes, registrations.split[i], registrations.sample[i])
         drawn = random.permutation(len(source))[:shape_points]
-        row = [registrations.inlier_rmse[i], *compare(source, target, drawn, neighbors)]
-        rows.append(row + [len(source) / len(target)] * point_count)
+        measured = compare(source, target, drawn, neighbors)
+        rows.append([registrations.inlier_rmse[i], *measured, len(source) / len(target)])
     return np.array(rows)
 
 

@@ -82,14 +82,13 @@ def read_numbers(
     columns: Iterable[str],
     numeric: Iterable[str],
     optional: Iterable[str] = (),
-    least: float = -np.inf,
     others: Iterable[str] = (),
 ) -> pd.DataFrame:
     """Read a CSV file as :func:`read_csv` does, with numeric columns as numbers; empty optional entries become NaN."""
     rows, may_be_empty = read_csv(path, columns, others), set(optional)
     for column in numeric:
         needed = rows[column] != "" if column in may_be_empty else True
-        rows[column] = numbers(path, rows, column, needed, least)
+        rows[column] = numbers(path, rows, column, needed)
     return rows
 
 
@@ -122,11 +121,11 @@ def write_csv(path: str | Path, frame: pd.DataFrame, form: str | None = "%.6f") 
         frame.to_csv(partial, index=False, float_format=form, lineterminator="\n")
 
 
-def write_columns(path: str | Path, columns: Mapping[str, np.ndarray], form: str = "%.6f") -> None:
+def write_columns(path: str | Path, columns: Mapping[str, np.ndarray]) -> None:
     """Write the bytes that :func:`write_csv` does of columns of one type each, without pandas."""
     arrays = map(np.asarray, columns.values())
     entries = [
-        ["" if value != value else form % value for value in of.tolist()] if of.dtype.kind == "f" else of.tolist()
+        ["" if value != value else f"{value:.6f}" for value in of.tolist()] if of.dtype.kind == "f" else of.tolist()
         for of in arrays
     ]
     with whole_file(path) as partial, partial.open("w", encoding="utf-8", newline="") as file:
