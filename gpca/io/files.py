@@ -10,7 +10,6 @@ import io
 import os
 import shutil
 import stat
-import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -248,18 +247,12 @@ def read_image(path: str | Path, remedy: str) -> np.ndarray:
     import numpy as np
     from PIL import Image
 
-    too_many = f"has more than {MOST_PIXELS} pixels, too many for a frame"
+    Image.MAX_IMAGE_PIXELS = None  # of which it would warn
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", Image.DecompressionBombWarning)
-            image = Image.open(path, formats=IMAGE_FORMATS)
-        with image:
-            if image.width * image.height > MOST_PIXELS:
-                raise InputError(path, too_many, remedy)
-            return np.asarray(image)
-    except InputError:
-        raise
-    except (Image.DecompressionBombError, Image.DecompressionBombWarning) as fault:
-        raise InputError(path, too_many, remedy) from fault
+        with Image.open(path, formats=IMAGE_FORMATS) as image:
+            pixels = np.asarray(image) if image.width * image.height <= MOST_PIXELS else None
     except Exception as fault:  # Pillow raises errors of many kinds for a damaged file
-        raise InputError(path, "is truncated or not a readable image", remedy) from fault
+        raise InputError(path, f"is truncated or not a readable image ({fault})", remedy) from fault
+    if pixels is None:
+        raise InputError(path, f"has more than {MOST_PIXELS} pixels, too many for a frame", remedy)
+    return pixels
