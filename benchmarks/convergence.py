@@ -148,10 +148,14 @@ def mean(by_seed: dict[str, dict], measure: str) -> float:
 
 
 def moves(longer: dict[str, dict], shorter: dict[str, dict]) -> bool:
-    """Return whether the longer training is better, in its loss or in an accuracy, by the rule of docs/appendix.md."""
+    """Return whether the longer training is better, in its loss or in an accuracy, by the rule of docs/appendix.md.
+
+    With one seed, the loss alone decides; of lengths without a common seed, nothing shows that they are alike.
+    """
     import numpy as np
 
-    seeds = sorted(set(longer) & set(shorter))
+    if not (seeds := sorted(set(longer) & set(shorter))):
+        return True
     gain_3_R = np.array([[float(longer[s][m]) - float(shorter[s][m]) for s in seeds] for m in ("loss", *MEASURES)])
     loss_R, *accuracies_R = gain_3_R
     errors = [2 * gain_R.std(ddof=1) / len(seeds) ** 0.5 for gain_R in accuracies_R] if len(seeds) > 1 else [np.inf] * 2
