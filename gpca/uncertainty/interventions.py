@@ -6,7 +6,7 @@ broader restarts, trimming to the overlap) that lowers the uncertainty points to
 """
 
 from dataclasses import replace
-from functools import cached_property
+from functools import cache
 from time import perf_counter
 from typing import NamedTuple
 
@@ -102,38 +102,27 @@ class RemedyRuns:
         source, self._target, self._T_init, self._T_icp = clouds
         self._xi_n_6, self._settings, random = draws
         self._observed = source[random.permutation(len(source))]
+        self._source, self._seen = cache(self._with_tree), cache(self._with_icp)  # whether denoised; whether trimmed
 
     def __call__(self, remedies: Remedies) -> Spread:
         """Evaluate one combination; work that several share is done, and charged, once."""
         started = perf_counter()
-        tree, points = self._denoised if remedies.denoise else self._whole
-        icp, target = self._trimmed if remedies.trim else self._untrimmed
+        (tree, points), (icp, target) = self._source(remedies.denoise), self._seen(remedies.trim)
         xi_n_6 = BROADER * self._xi_n_6 if remedies.restart else self._xi_n_6
         runs = run_from_starts(icp, points[: self._settings.icp_points], self._T_init, xi_n_6)
         if remedies.restart:
             runs = best_of_neighbors(runs, self._settings.icp.correspondence_distance)
         return summarize_runs(runs, tree, target, self._T_icp, self._settings, started)
 
-    @cached_property
-    def _whole(self) -> tuple[cKDTree, np.ndarray]:
-        return cKDTree(self._observed), self._observed
-
-    @cached_property
-    def _denoised(self) -> tuple[cKDTree, np.ndarray]:
-        points = denoise(self._observed)
+    def _with_tree(self, denoised: bool) -> tuple[cKDTree, np.ndarray]:
+        points = denoise(self._observed) if denoised else self._observed
         return cKDTree(points), points
 
-    @cached_property
-    def _untrimmed(self) -> tuple[AnyICP, np.ndarray]:
-        return self._seen(self._target)
-
-    @cached_property
-    def _trimmed(self) -> tuple[AnyICP, np.ndarray]:
-        aligned = transform(self._T_icp, self._observed)
-        return self._seen(trim(self._target, aligned, self._settings.icp.correspondence_distance))
-
-    def _seen(self, target: np.ndarray) -> tuple[AnyICP, np.ndarray]:
-        return icp_to(target[: self._settings.icp_points], self._settings.icp), target
+    def _with_icp(self, trimmed: bool) -> tuple[AnyICP, np.ndarray]:
+        target, icp = self._target, self._settings.icp
+        if trimmed:
+            target = trim(target, transform(self._T_icp, self._observed), icp.correspondence_distance)
+        return icp_to(target[: self._settings.icp_points], icp), target
 
 
 def denoise(points: np.ndarray) -> np.ndarray:

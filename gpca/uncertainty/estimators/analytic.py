@@ -26,20 +26,23 @@ def sample(registered: RegisteredPair, starts: int, *axes: object) -> np.ndarray
     return registered.twists_from(random.normal(size=(starts, 6)) * registered.deviation_6)
 
 
-def brossard(registered: RegisteredPair, noise: float = 0.0, bias: float = 0.0) -> np.ndarray:
-    """Return Σ = Σ_unscented + σ² A⁻¹ + b² g gᵀ with g = A⁻¹ Σ Jᵀ (Brossard, Bonnabel & Barrau, RA-L 2020).
+def brossard(registered: RegisteredPair) -> np.ndarray:
+    """Return Σ = Σ_unscented + σ² (A⁻¹ + g gᵀ) with g = A⁻¹ Σ Jᵀ (Brossard, Bonnabel & Barrau, RA-L 2020).
 
-    An unscented transform takes the starts' spread through the method by 2·6 sigma points and their middle. The
-    sensor's white noise w and a bias b, the same for all points along their normals, move the minimum by
-    A⁻¹ Σ Jᵀ (w + b) with A = Σ JᵀJ; the bias remains when there are many points. In diameters, σ is estimated from the
-    distances if 0, and b is then as large, as the authors take it.
+    An unscented transform takes the starts' spread through the method by sigma points. The sensor's white noise w and a
+    bias b, the same for all points along their normals, move the minimum by A⁻¹ Σ Jᵀ (w + b) with A = Σ JᵀJ; σ is
+    estimated from the distances, and b is as large, as the authors take it.
     """
-    distances_n, rows_n_6 = registered.matches().plane_rows()
-    variance = noise**2 if noise else np.square(distances_n).sum() / max(len(distances_n) - 6, 1)
-    inverse_6_6 = inverse_hessian(np.einsum("ni,nj->ij", rows_n_6, rows_n_6))
+    variance, inverse_6_6, rows_n_6 = plane_fit(registered)
     shift_6 = inverse_6_6 @ rows_n_6.sum(axis=0)
-    sensor_6_6 = variance * inverse_6_6 + (bias**2 or variance) * np.outer(shift_6, shift_6)
-    return unscented(registered) + sensor_6_6
+    return unscented(registered) + (variance * inverse_6_6 + variance * np.outer(shift_6, shift_6))
+
+
+def plane_fit(registered: RegisteredPair) -> tuple[float, np.ndarray, np.ndarray]:
+    """Return σ² of the distances from planes, (Σ JᵀJ)⁻¹ (6, 6) and their rows J (n, 6)."""
+    distances_n, rows_n_6 = registered.matches().plane_rows()
+    variance = np.square(distances_n).sum() / max(len(distances_n) - 6, 1)
+    return variance, inverse_hessian(np.einsum("ni,nj->ij", rows_n_6, rows_n_6)), rows_n_6
 
 
 def unscented(registered: RegisteredPair) -> np.ndarray:
@@ -49,12 +52,8 @@ def unscented(registered: RegisteredPair) -> np.ndarray:
     return np.cov(twists_m_6, rowvar=False, bias=True)
 
 
-def bonnabel(registered: RegisteredPair, noise: float = 0.0) -> np.ndarray:
-    """Return Σ = σ² (Σ JᵀJ)⁻¹ of point-to-plane ICP (Bonnabel, Barczyk & Goulette, ACC 2016).
-
-    Between points the same formula makes the pose look held where it is not. σ, `noise`, is the standard deviation of
-    the distances from planes, in diameters; with 0 it is estimated from them.
-    """
+def bonnabel(registered: RegisteredPair) -> np.ndarray:
+    """Return Σ = σ² (Σ JᵀJ)⁻¹ of point-to-plane ICP (Bonnabel, Barczyk & Goulette, ACC 2016)."""
     if registered.method.startswith(POINT_TO_POINT):
         raise FailedEstimate(
             "the Hessian is no covariance of point-to-point, as it leaves out that matches change with the pose; "
@@ -62,26 +61,23 @@ def bonnabel(registered: RegisteredPair, noise: float = 0.0) -> np.ndarray:
         )
     if registered.method != POINT_TO_PLANE:
         raise FailedEstimate(f"the rule is that of point_to_plane, not of '{registered.method}'")
-    distances_n, rows_n_6 = registered.matches().plane_rows()
-    variance = noise**2 if noise else np.square(distances_n).sum() / max(len(distances_n) - 6, 1)
-    return variance * inverse_hessian(np.einsum("ni,nj->ij", rows_n_6, rows_n_6))
+    variance, inverse_6_6, _ = plane_fit(registered)
+    return variance * inverse_6_6
 
 
-def censi(registered: RegisteredPair, noise: float = 0.0) -> np.ndarray:
+def censi(registered: RegisteredPair) -> np.ndarray:
     """Return Σ of point-to-point ICP (Censi, ICRA 2007).
 
     With A(z, ξ) the cost of the points z at the twist ξ, Σ = H⁻¹ (∂²A/∂z∂ξ) Σ_z (∂²A/∂z∂ξ)ᵀ H⁻¹ with H = ∂²A/∂ξ². It
-    leaves out that the matches change with the pose. `noise` is the standard deviation of every coordinate of both
-    clouds' points, in diameters; with 0 it is estimated from the residuals, in which that of both clouds adds up.
+    leaves out that the matches change with the pose. The residuals, from which Σ_z is, have the noise of both clouds.
     """
     if not registered.method.startswith(POINT_TO_POINT):
         raise FailedEstimate(f"the closed form is that of point-to-point, not of '{registered.method}'")
     matches = registered.matches()
-    variance = noise**2 if noise else matches.variance / 2
     inverse_6_6 = inverse_hessian(hessian(matches))
     of_source_n_6_3, of_target_n_6_3 = mixed_derivatives(matches)
     middle_6_6 = sum(np.einsum("nij,nkj->ik", of_z, of_z) for of_z in (of_source_n_6_3, of_target_n_6_3))
-    return variance * inverse_6_6 @ middle_6_6 @ inverse_6_6
+    return matches.variance / 2 * inverse_6_6 @ middle_6_6 @ inverse_6_6
 
 
 def hessian(matches: Correspondences) -> np.ndarray:

@@ -16,7 +16,6 @@ def test_bonnabel_is_the_variance_over_the_hessian_of_planes():
     distances = np.array([n @ (y - q) for y, q, n in zip(matches.source, matches.target, matches.normals, strict=True)])
     expected = distances @ distances / (len(rows) - 6) * np.linalg.inv(rows.T @ rows)
     assert analytic.bonnabel(pair) == pytest.approx(expected)
-    assert analytic.bonnabel(pair, noise=0.1) == pytest.approx(0.01 * np.linalg.inv(rows.T @ rows))
 
 
 def test_bonnabel_refuses_point_to_point_and_says_why():
@@ -56,12 +55,11 @@ def test_unscented_is_exact_where_the_result_is_linear_in_the_start(monkeypatch)
 def test_the_sensor_adds_noise_and_a_bias():
     pair = registered("point_to_plane")
     base = analytic.unscented(pair)
-    _, rows = pair.matches().plane_rows()
+    distances, rows = pair.matches().plane_rows()
     inverse = np.linalg.inv(rows.T @ rows)
     shift = inverse @ rows.sum(axis=0)
-    expected = 0.01 * inverse + 0.04 * np.outer(shift, shift)
-    assert analytic.brossard(pair, noise=0.1, bias=0.2) - base == pytest.approx(expected, abs=1e-12)
-    assert analytic.brossard(pair, noise=0.1) == pytest.approx(analytic.brossard(pair, noise=0.1, bias=0.1))
+    expected = distances @ distances / (len(rows) - 6) * (inverse + np.outer(shift, shift))
+    assert analytic.brossard(pair) - base == pytest.approx(expected, abs=1e-12)
 
 
 def test_monte_carlo_is_of_the_pairs_own_draws():

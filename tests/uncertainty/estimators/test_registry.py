@@ -88,7 +88,7 @@ def test_one_that_learns_needs_examples_and_fails_at_too_few():
         ("icp", {}, r"estimator 'icp': unknown; choose one of .*brossard"),
         ("censi", {"sigma": 1}, r"estimator 'censi': setting sigma: unknown"),
         ("monte_carlo", {"starts": 2.5}, r"setting starts: 2.5 should be a valid integer"),
-        ("censi", {"noise": -1}, r"setting noise: -1 should be greater than or equal to 0"),
+        ("cello", {"learning_rate": -1}, r"setting learning_rate: -1 should be greater than or equal to 0"),
         ("cello", {"steps": "many"}, r"setting steps: 'many' should be a valid integer"),
     ],
 )
