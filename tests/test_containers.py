@@ -4,8 +4,6 @@ import re
 
 import yaml
 
-from gpca.process.environment import SYSTEM_PACKAGES
-
 from .documents import ROOT
 
 DOCKER = (ROOT / "containers/Dockerfile").read_text()
@@ -20,8 +18,8 @@ def packages(recipe):
 
 def test_both_install_what_the_check_of_every_commit_takes_for_granted():
     check = (ROOT / ".ci/run").read_text()
-    libraries = {debian for library, (debian, _) in SYSTEM_PACKAGES.items() if library in check}
-    assert libraries == {"libgl1", "libx11-6", "libgomp1"}
+    libraries = {"libgl1", "libx11-6", "libgomp1"}
+    assert all(f"missing+=({library})" in check for library in libraries)
     workflow = yaml.safe_load((ROOT / ".github/workflows/ci.yml").read_text())["jobs"]["check"]
     [given] = re.findall(r"--no-install-recommends (.+)", workflow["steps"][0]["run"])
     assert packages(DOCKER) == packages(APPTAINER) == libraries | {"gcc", "libc6-dev", "python3-venv", *given.split()}

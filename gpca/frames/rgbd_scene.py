@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -51,11 +50,6 @@ def rest(poses_n: np.ndarray, probabilities_n: np.ndarray, random: np.random.Gen
 DEPTH_SCALE = 0.1  # millimeters per unit of the depth images
 Distance = Annotated[float, Bounds(minimum=0.2, maximum=10)]  # in meters
 Elevation = Annotated[float, Bounds(minimum=0, maximum=89)]  # in degrees
-DESCRIPTION = "dataset_info.json"
-WRITTEN = re.compile(
-    rf"{DESCRIPTION}|models/(obj_\d{{6}}\.ply|models_info\.json)"
-    r"|test/\d{6}/(scene_(camera|gt)\.json|(depth|rgb|mask_visib)/\d{6}(_\d{6})?\.png)"
-)
 TABLE_COLOR = (0.72, 0.65, 0.55)
 
 
@@ -101,14 +95,6 @@ def write_scenes(surfaces: Iterable[Surface], source: str, settings: SceneSettin
     import trimesh
 
     folder = Path(folder)
-    if folder.exists() and not folder.is_dir():
-        raise InputError(folder, "is not a folder", "choose another name")
-    files = [
-        path.relative_to(folder).as_posix() for path in folder.rglob("*") if not path.is_dir() or path.is_symlink()
-    ]
-    if others := [name for name in files if DESCRIPTION not in files or not WRITTEN.fullmatch(name)]:
-        fault = f"contains files other than scenes, which would be lost, such as {others[0]}"
-        raise InputError(folder, fault, "choose another folder")
     surfaces = [center(surface) for surface in surfaces]
     resting = [stable_poses(surface) for surface in surfaces]
     with whole_folder(folder) as partial:
@@ -127,9 +113,6 @@ def write_scenes(surfaces: Iterable[Surface], source: str, settings: SceneSettin
                 **find_symmetries(cloud_m, diameter_m),
             }
         _write_json(partial / "models/models_info.json", info)
-        drawn = {"scenes" if name == "count" else name: value for name, value in asdict(settings).items()}
-        title = f"{source}, procedural stand-in" if settings.families else source
-        _write_json(partial / DESCRIPTION, {"title": title, **drawn})
         for scene in progress(range(settings.count), f"scenes of {source}"):
             standing = lay_table(surfaces, settings, source, scene, resting)
             middle_m = np.mean([object_.T_world_object[:3, 3] for object_ in standing], axis=0)

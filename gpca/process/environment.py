@@ -34,14 +34,6 @@ MODULES = {  # extra of pyproject.toml -> modules of its packages, which `gpca e
     ),
     "workflow": ("docutils", "jinja2", "markupsafe", "matplotlib", "snakemake"),
 }
-SYSTEM_PACKAGES = {  # shared library -> package of Debian and Ubuntu, of Fedora
-    "libGL.so.1": ("libgl1", "mesa-libGL"),
-    "libX11.so.6": ("libx11-6", "libX11"),
-    "libgomp.so.1": ("libgomp1", "libgomp"),
-    "libEGL.so.1": ("libegl1", "mesa-libEGL"),
-    "libusb-1.0.so.0": ("libusb-1.0-0", "libusb1"),
-    "libstdc++.so.6": ("libstdc++6", "libstdc++"),
-}
 
 
 def remedy(extra: str) -> str:
@@ -59,13 +51,7 @@ def missing(fault: ModuleNotFoundError) -> str | None:
 def system_library_hint(message: str) -> str | None:
     """Return a remedy for the dynamic linker's message, None if it names no missing shared library."""
     match = re.search(r"(\S+\.so[.\d]*): cannot open shared object file", message)
-    if match is None:
-        return None
-    library = match[1]
-    if library not in SYSTEM_PACKAGES:
-        return f"install the system package that provides {library}"
-    debian, fedora = SYSTEM_PACKAGES[library]
-    return f"install {library}: 'apt-get install {debian}' (Debian, Ubuntu) or 'dnf install {fedora}' (Fedora)"
+    return match and f"install the system package that provides {match[1]} (docs/troubleshooting.md)"
 
 
 def require_open3d() -> ModuleType:

@@ -1,7 +1,6 @@
 """Numba with a cache of compiled loops per state of their code, imported when the first loop is compiled.
 
-Numba itself checks a function's own file only, not the modules that it imports. The caches name a loop by its
-package, not by its path as numba does, so that a copied or moved checkout keeps its compiled loops.
+Numba itself checks a function's own file only, not the modules that it imports.
 """
 
 from __future__ import annotations
@@ -11,10 +10,8 @@ import os
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from numba import config, njit, prange, types
-from numba.core.caching import UserProvidedCacheLocator
 from numba.core.event import Listener, register
 from numba.extending import typeof_impl
 
@@ -51,20 +48,6 @@ def _cache_folder() -> Path:
     return (folder if is_ours else Path(tempfile.mkdtemp(prefix="gpca-numba-"))) / state
 
 
-class PackageLocator(UserProvidedCacheLocator):
-    """Keeps the loops of one of our packages in a folder of its name."""
-
-    @classmethod
-    def from_function(cls, py_func: Any, py_file: str) -> PackageLocator | None:
-        """Return the locator of one of our functions; None leaves others to numba."""
-        return super().from_function(py_func, py_file) if Path(py_file).is_relative_to(ROOT) else None
-
-    @classmethod
-    def get_suitable_cache_subpath(cls, py_file: str) -> str:
-        """Return the name of the file's package."""
-        return ".".join(Path(py_file).relative_to(ROOT).parent.parts)
-
-
 class Compilations(Listener):
     """Calls a function before each."""
 
@@ -81,4 +64,3 @@ class Compilations(Listener):
 
 os.environ[VARIABLE] = str(_cache_folder())  # read by numba whenever such a variable has changed, and by children
 setattr(config, "CACHE_DIR", os.environ[VARIABLE])  # noqa: B010 - numba may have been imported before
-setattr(config, "CACHE_LOCATOR_CLASSES", f"{__name__}.{PackageLocator.__name__},{UserProvidedCacheLocator.__name__}")  # noqa: B010

@@ -75,8 +75,6 @@ def test_scenes_are_drawn_of_the_models_of_datasets(scenes, tmp_path):
     assert [model["diameter"] for model in made.values()] == pytest.approx(
         [model["diameter"] for model in shown.values()], rel=0.01
     )
-    told = json.loads((tmp_path / "drawn/dataset_info.json").read_text())
-    assert (told["title"], told["families"]) == ("virtual", [])
 
 
 def test_objects_that_are_tested_are_rendered_only_if_that_is_asked(scenes, tmp_path, capsys):

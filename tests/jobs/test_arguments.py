@@ -79,21 +79,10 @@ def test_names_that_are_empty_or_take_more_than_a_line_are_refused(tmp_path, nam
 ROOT = Path(__file__).resolve().parents[2]
 
 
-@pytest.mark.parametrize(
-    ("library", "debian"), [("libGL.so.1", "libgl1"), ("libX11.so.6", "libx11-6"), ("libgomp.so.1", "libgomp1")]
-)
-def test_names_the_package_of_a_known_library(library, debian):
-    hint = system_library_hint(f"{library}: cannot open shared object file: No such file or directory")
-    assert library in hint
-    assert f"apt-get install {debian}'" in hint
-    assert "dnf install" in hint
-
-
-def test_names_an_unknown_library_by_itself_and_nothing_where_none_is_missing():
+def test_a_missing_library_is_named():
     assert system_library_hint("No module named 'open3d'") is None
     hint = system_library_hint("/opt/x/libtbb.so.12: cannot open shared object file: No such file or directory")
     assert "libtbb.so.12" in hint
-    assert "apt-get" not in hint
 
 
 def test_open3d_imports_here():
@@ -115,7 +104,10 @@ def test_open3d_comes_without_its_windows_which_others_may_import_later():
     ("package", "expected"),
     [
         ("import ctypes\nctypes.CDLL('libgpca-absent.so.3')\n", "provides libgpca-absent.so.3"),
-        ("raise ImportError('libGL.so.1: cannot open shared object file: No such file')\n", "apt-get install libgl1"),
+        (
+            "raise ImportError('libGL.so.1: cannot open shared object file: No such file')\n",
+            "provides libGL.so.1",
+        ),
         ("raise ImportError('undefined symbol')\n", "make environment"),
     ],
 )

@@ -97,13 +97,6 @@ def test_a_first_call_says_that_it_compiles_and_later_ones_do_not(package):
     assert [imported(package, code).stderr for _ in range(2)] == [f"{NOTICE}{REMEDY}\n", ""]
 
 
-def test_a_copy_elsewhere_takes_along_what_was_compiled(package, tmp_path_factory):
-    code = "from gpca.upper import upper; print(upper(1), *upper.dispatcher.stats.cache_hits.values())"
-    assert imported(package, code).stdout.strip() == "20"
-    copy = shutil.copytree(package, tmp_path_factory.mktemp("elsewhere") / "copy")
-    assert imported(copy, code).stdout.strip() == "20 1"
-
-
 def test_loops_of_others_are_kept_too(package, tmp_path_factory):
     elsewhere = tmp_path_factory.mktemp("elsewhere")
     (elsewhere / "theirs.py").write_text("from numba import njit\n@njit(cache=True)\ndef f(x):\n    return x\n")
