@@ -25,11 +25,7 @@ DropoutRate = Annotated[float, Bounds(minimum=0, exclusiveMaximum=1)]
 
 
 class Heads:
-    """E heads d -> hidden -> C with ReLU, trained side by side from different starts and on different batches.
-
-    AdamW minimizes the cross-entropy of random batches, with a cosine schedule and dropout before the last layer. The
-    axes name the random numbers.
-    """
+    """E heads d -> hidden -> C with ReLU, trained side by side from different starts and on different batches."""
 
     def __init__(
         self,

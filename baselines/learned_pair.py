@@ -1,8 +1,4 @@
-"""GP-CA on the embedding of a small DGCNN that sees both clouds after ICP: concepts, and causes.
-
-``gpca_pair_dgcnn`` also reads the numbers of ICP's motion and, for causes, of its runs from other starts; ``_clouds``
-reads the clouds, and how well ICP says they fit.
-"""
+"""GP-CA on the embedding of a small DGCNN that sees both clouds after ICP: concepts, and causes."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""Three plain numbers of a registration and an ordinary classifier: the rival that a referee asks for first.
-
-Noise raises the forward residual (source to target), a missing part the backward residual (target to source), a poor
-pose both, and the spread of the Monte-Carlo poses of ICP. Like GP-CA, the classifiers learn from the training labels.
-"""
+"""Three plain numbers of a registration and an ordinary classifier: the rival that a referee asks for first."""
 
 from functools import partial
 

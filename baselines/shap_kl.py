@@ -17,11 +17,7 @@ ALL_CORNERS = list(range(8))  # with which the designs of knobs begin
 
 
 def shapley_values(worth_N_8: np.ndarray) -> np.ndarray:
-    """Return the Shapley values (N, 3) of N games, given the worth of all 8 coalitions of each.
-
-    With three features ``shap.KernelExplainer`` enumerates the coalitions, so these are the exact values
-    φ_i = Σ_S |S|! (2 − |S|)! / 3! (v(S ∪ i) − v(S)). As one model with N outputs, the N games share one regression.
-    """
+    """Return the Shapley values (N, 3) of N games, given the worth of all 8 coalitions of each."""
     import shap
 
     def worth(present_M_3: np.ndarray) -> np.ndarray:

@@ -1,8 +1,4 @@
-"""Explainers without training: guessing, the most frequent label, and a rule of three lines.
-
-A method's gain is its lead over the best of these. The rule uses the paper's protocol: only pose samples start away
-from the truth, and only overlap samples have fewer points. Its accuracy is what the protocol itself gives away.
-"""
+"""Explainers without training: guessing, the most frequent label, and a rule of three lines."""
 
 import math
 from collections.abc import Callable

@@ -1,8 +1,4 @@
-"""What SHAP and sensitivity analysis share: turning values per concept and registration into an attribution.
-
-Values of knobs are used directly. A remedy may lower the uncertainty of every pair a little, so without labels its
-values are standardized over the training split; with labels a classifier reads them.
-"""
+"""What SHAP and sensitivity analysis share: turning values per concept and registration into an attribution."""
 
 from collections.abc import Callable
 from dataclasses import replace

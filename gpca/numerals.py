@@ -1,8 +1,4 @@
-"""Numbers in text: those of users are finite plain decimals in ASCII, and lengths are shown without exponents.
-
-Python's int() and float() also accept digits of other scripts, underscores, NaN and infinity, and integers so long that
-they take minutes; all of these are typos or damage in a file.
-"""
+"""Numbers in text: those of users are finite plain decimals in ASCII, and lengths are shown without exponents."""
 
 import math
 import re

@@ -52,10 +52,7 @@ def random_direction(random: np.random.Generator) -> np.ndarray:
 
 
 def as_rows(T_b_a: np.ndarray, reach: float) -> list[str]:
-    """Write a pose, row by row: as many decimals as points at this distance from the origin need, in diameters.
-
-    Within float64, the rounding moves no such point by more than 1e-6 diameters.
-    """
+    """Write a pose, row by row: as many decimals as points at this distance from the origin need, in diameters."""
     decimals = int(np.clip(np.ceil(np.log10(reach)) + 7, 9, 15))
     return [" ".join([*(f"{r:{decimals + 3}.{decimals}f}" for r in row), f"{t:17.9f}"]) for *row, t in T_b_a]
 

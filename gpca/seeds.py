@@ -10,10 +10,7 @@ from gpca.numerals import whole
 
 
 def seed_of(*axes: object) -> int:
-    """Return a 63-bit seed for the named axes, e.g. ``seed_of("ycb", 3, "registration", 17)``.
-
-    It is the SHA-256 of the axes, joined by a separator that no name contains, and equal on all platforms and locales.
-    """
+    """Return a 63-bit seed for the named axes, e.g. ``seed_of("ycb", 3, "registration", 17)``."""
     text = "\x1f".join(str(axis) for axis in axes)
     return int.from_bytes(hashlib.sha256(text.encode(errors="surrogateescape")).digest()[:8], "big") >> 1
 

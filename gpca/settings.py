@@ -1,8 +1,4 @@
-"""Settings: types of a settings class, or of a function's arguments, that pydantic checks and names the faults of.
-
-A settings class is a frozen dataclass with fields such as ``batch: Annotated[int, Bounds(minimum=2)]``. What plainly
-fits is read without pydantic, whose import takes longer than most of an explanation.
-"""
+"""Settings: types of a settings class, or of a function's arguments, that pydantic checks and names the faults of."""
 
 from __future__ import annotations
 

@@ -180,11 +180,7 @@ class Registrar:
     _targets: dict[tuple[int, ...], MovingICP] = field(default_factory=dict)  # by the causes that change them
 
     def run(self, causes: tuple[int, ...], xi_n_6: np.ndarray) -> Runs:
-        """Register with these causes from the starts exp(ξ) T_init; may raise Unmeasurable.
-
-        Poses take what was observed to the model. The inlier RMSE of a run without any correspondence is the
-        correspondence distance: 0 would be the best there is.
-        """
+        """Register with these causes, the observed to the model, from exp(ξ) T_init; may raise Unmeasurable."""
         starts_n = exp(xi_n_6) @ self.candidate.start(causes)
         observed, model = self.candidate.observed(causes), self.candidate.reference(causes)
         started = perf_counter()

@@ -121,11 +121,7 @@ def candidate_of_view(
     diameter_m: float,
     random: np.random.Generator,
 ) -> Candidate:
-    """Return what was seen of an object at a pose that is taken for the true one, with all that may be taken away.
-
-    Rows of what was measured are kept; models are what the camera would see where the registration starts, and at that
-    pose, in diameters as is the pose 4×4, which takes what was observed to where it lies in the model at the start.
-    """
+    """Return what was seen of an object at a pose that is taken for the true one, with all that may be taken away."""
     most = round(len(kept) * (1 - view.share) / max(view.share, 1e-9))
     hidden = view.unmeasured[random.permutation(len(view.unmeasured))[:most]]
     residuals = view.measured[kept] - view.clean[kept]

@@ -194,12 +194,7 @@ class RecordedPair:
 
 
 def measure_cases(cases: Iterable[RecordedPair], measuring: Measuring, axes: Axes, nothing: tuple[str, str]) -> Causes:
-    """Measure registrations as test samples, from two sets of starts each.
-
-    This is the one way to measure what happened in a world that gives cases: depth frames (:mod:`gpca.causes.frames`)
-    or scans (:mod:`gpca.causes.scans`). One that finds no correspondence is measured where it started; one that cannot
-    be measured is left out and named on stderr; `nothing` is the fault if there is no other, and its remedy.
-    """
+    """Measure test samples from two sets of starts; what has no truth is left out, and named on stderr."""
     records: list[dict[str, Any]] = []
     for case in cases:
         try:

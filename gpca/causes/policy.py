@@ -1,8 +1,4 @@
-"""The recovery policy: from concept scores to one of four branches (paper Sec. V, Fig. 6).
-
-A case is queued for labeling if the classifier is uncertain or no concept dominates. Otherwise, the dominant concept is
-treated. Scores are computed again after each action; after several actions without improvement, the case is queued.
-"""
+"""The recovery policy: from concept scores to one of four branches (paper Sec. V, Fig. 6)."""
 
 from __future__ import annotations
 

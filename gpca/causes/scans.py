@@ -159,11 +159,7 @@ def middle(pair: ScanPair) -> np.ndarray:
 
 
 def sensor_noise_m(pair: ScanPair) -> float:
-    """Return the standard deviation, in meters, of measured points across the surface.
-
-    It is an upper bound: that of the distances at the true pose of the source's common points from the planes of the
-    target's nearest points, by their median; both scans' noise and errors of the true pose add up in it.
-    """
+    """Return an upper bound of the standard deviation, in meters, of measured points across the surface."""
     common = transform(pair.T_target_source, pair.source_N_3[pair.source_common_N].astype(np.float64))
     if not len(common):
         return 0.0

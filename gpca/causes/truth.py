@@ -23,10 +23,7 @@ GEOMETRY = "geometry"  # the clean pair is off already: too little shape to hold
 
 
 def shapley_values(worth_S_8: np.ndarray) -> np.ndarray:
-    """Return φ (S, 3) of the concepts, φ_i = Σ_{S ∌ i} |S|! (2 − |S|)! / 3! (v(S ∪ i) − v(S)).
-
-    They add up to v(all) − v(none). ``baselines.shap_kl`` leaves the same to the shap library, as users of SHAP do.
-    """
+    """Return φ (S, 3), φ_i = Σ_{S ∌ i} |S|! (2 − |S|)! / 3! (v(S ∪ i) − v(S)), together v(all) − v(none)."""
     phi_S_3 = np.zeros((len(worth_S_8), len(CONCEPTS)))
     for i in range(len(CONCEPTS)):
         for subset, present in enumerate(SUBSETS):

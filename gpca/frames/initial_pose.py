@@ -38,10 +38,7 @@ FARTHEST_MM = 1e4  # no estimator is off by more
 def read_bop_results(
     path: str | Path, distances_m: Mapping[tuple[int, int], Sequence[float]], ids: Collection[int]
 ) -> PosesByObject:
-    """Return the poses ``T_camera_model`` of a BOP results file by (scene, image, object id), the highest score first.
-
-    `distances_m` of the annotated objects from the camera, by (scene, image), reveal translations in another unit.
-    """
+    """Return the poses ``T_camera_model`` of a BOP results file by (scene, image, object id), the best first."""
     rows = read_csv(path, RESULT_COLUMNS, others=ANY, remedy=REMEDY)
     scored_poses: dict[tuple[int, int, int], list[tuple[float, np.ndarray]]] = {}
     ratios = []

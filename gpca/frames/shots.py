@@ -69,10 +69,7 @@ def rendered_side(
     surface_m: np.ndarray,
     most_pixels: int = MOST_PIXELS,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the points (V, 3) of an object that a camera would see with nothing in front, and their pixels (V, 2).
-
-    About `most_pixels`, also outside the image; none where a part of the object would lie behind the camera.
-    """
+    """Return the points (V, 3) of an object that a camera would see with nothing in front, and their pixels (V, 2)."""
     shown = rotate(camera_3_3, transform(T_camera_object, surface_m))
     if shown[:, 2].min() <= 0:
         return np.empty((0, 3)), np.empty((0, 2), int)

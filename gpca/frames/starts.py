@@ -46,10 +46,7 @@ def all_starts(
     models: Mapping[str, Mapping[int, CenteredModel]],
     rungs: Sequence[tuple[float, float]],
 ) -> Starts:
-    """Return every start of every instance, by kind; `rungs` are turns in degrees and shifts in diameters.
-
-    Where no dataset has results, an initial pose that global registration found counts as an estimate.
-    """
+    """Return every start of every instance, by kind; `rungs` are turns in degrees and shifts in diameters."""
     numbers = {
         (name, objects.names.index(model.surface.name)): number
         for name, by_id in models.items()

@@ -40,12 +40,7 @@ def record_provenance(
     seed: int | None = None,
     folders: bool = False,
 ) -> Iterator[dict]:
-    """Time the block and, when it succeeds, write ``<output>.provenance.json`` beside each output.
-
-    Inputs are files, which are hashed (SHA-256); `settings` are all that the result depends on besides them. The block
-    can add to the record by the mapping. An output that cannot be written is refused before the block, as an
-    InputError. The commit and the hash of environment.lock are null for a package outside a checkout.
-    """
+    """Time the block, which may add to the record, and write ``<output>.provenance.json`` beside each output."""
     require_outputs(outputs, inputs, folders)
     started, added = time.perf_counter(), {}  # type: ignore[var-annotated]
     yield added

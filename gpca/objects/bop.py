@@ -135,13 +135,7 @@ def require_symmetries(listed: Mapping[str, Any], subject: str) -> None:
 def find_symmetries(
     points_N_3: np.ndarray, diameter: float, distances: Callable | None = None, limit: float = TOLERANCE
 ) -> dict[str, list]:
-    """Return the turns about the axes of the bounding box that leave the shape unchanged, as BOP writes them.
-
-    After one, the mean distance of the points from the surface is at most `limit` diameters. Without `distances` of
-    points (N, 3), it is that to the nearest neighbor, and may exceed the limit by the spacing of the points. On their
-    scans, this finds the two symmetric objects of LINEMOD. Shape alone counts: a printed can is symmetric. The cloud is
-    whole and centered. Only keys with entries are returned.
-    """
+    """Return the turns about the box axes that leave points within `limit` diameters of the surface, as BOP does."""
     from scipy.spatial import cKDTree
     from scipy.spatial.transform import Rotation
 

@@ -1,12 +1,7 @@
-"""Point clouds in files: PCD (0.6, 0.7), NumPy's, text, and bin of scanners.
+"""Point clouds in files: PCD (0.6, 0.7), NumPy's, text, and bin of scanners; rows without a measurement are kept.
 
-Rows without a measurement are kept as they are; :func:`gpca.objects.surface.measured` finds them.
-
-PCD: https://pointclouds.org/documentation/tutorials/pcd_file_format.html. Open3D's reader (0.19) fills gaps of a cut
-file or a short row with whatever the memory holds, and reads a double after bytes as 0.
-
-As a kind of source, the UW RGB-D Object Dataset (Lai, Bo, Ren, Fox, ICRA 2011): single views of objects, as PCD
-files named <class>_<instance>_<sequence>_<frame>; in meters, in the camera's frame.
+Open3D's reader of PCD (0.19) fills gaps of a cut file with whatever the memory holds. As a kind of source, single views
+of the UW RGB-D Object Dataset (Lai et al. 2011): PCD files named <class>_<instance>_<sequence>_<frame>, in meters.
 """
 
 import io

@@ -1,8 +1,4 @@
-"""What two aligned clouds alone tell of their registration: distances, local planes, and entropies of the joint cloud.
-
-The first four groups of thirteen distances are the plainest: how far the observed cloud lies from the model, the model
-from it, it from the model's local planes, and how thick it is.
-"""
+"""What two aligned clouds tell of their registration: distances, local planes, entropies of the joint cloud."""
 
 from __future__ import annotations
 
@@ -127,11 +123,7 @@ class MatchedPair:
 
 
 def describe_distances(pair: ObservedPair, matched: MatchedPair | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Return the 52 distances of the pair, and 45 further numbers of its local planes.
-
-    These are quantiles of the model's distance from the observed cloud's planes, of |cosine| between partners' normals,
-    and of the model's thickness; both median spacings and extents; and logarithms of the numbers of points.
-    """
+    """Return the 52 distances of the pair, and 45 further numbers of its local planes."""
     matched = matched or MatchedPair.of(pair)
     observed, model = matched.observed, matched.model
     widths = [np.median(getattr(planes, name)) for name in ("spacing", "extent") for planes in (observed, model)]

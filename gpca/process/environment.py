@@ -55,10 +55,7 @@ def system_library_hint(message: str) -> str | None:
 
 
 def require_open3d() -> ModuleType:
-    """Import and return Open3D; the line of an InputError names the extra, or the missing system library.
-
-    Its windows and its learning stay out: they are nine tenths of its seconds, in Dash, scikit-learn and IPython.
-    """
+    """Import and return Open3D; the line of an InputError names the extra, or the missing system library."""
     unused = [name for name in ("open3d.ml", "open3d.visualization") if name not in sys.modules]
     sys.modules.update({name: ModuleType(name) for name in unused})
     try:

@@ -1,13 +1,4 @@
-"""Plugins: modules of installed packages, and files or modules under ``plugins`` in a config.
-
-A module lists its entries in the same variables as the suite's modules, such as ``EXPLAINERS``. An installed package
-announces it by an entry point in the group of its entries::
-
-    [project.entry-points."gpca.explainers"]
-    my_package = "my_package.explainers"
-
-The plugins of a config reach the jobs of a run by an environment variable.
-"""
+"""Plugins: modules that packages announce, and files or modules under ``plugins`` in a config (docs/adding.md)."""
 
 import json
 import os

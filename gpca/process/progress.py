@@ -26,10 +26,7 @@ def progress(items: Iterable[Item], title: str, **options) -> Iterator[Item]:
 
 @contextmanager
 def certain_interrupts() -> Iterator[None]:
-    """End the block with KeyboardInterrupt if Ctrl-C occurs in it, even if that exception was swallowed.
-
-    Nothing changes where SIGINT is ignored, as in the background of a shell, or has another handler.
-    """
+    """End the block with KeyboardInterrupt if Ctrl-C occurs in it, even if that exception was swallowed."""
     global _interrupted
     if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield

@@ -21,11 +21,7 @@ _PROGRESS = "progress"  # Snakemake's event of its count of jobs
 
 
 class TimeLeft:
-    """Work that is left, in seconds of one core, on as many one-core jobs side by side as there are cores.
-
-    `expected` has the seconds of each job's benchmark file, None where unknown. `trust_s` is the core time that the
-    expected speed is worth against that of the finished jobs.
-    """
+    """Work that is left, in seconds of one core, on as many one-core jobs side by side as there are cores."""
 
     def __init__(self, expected: Mapping[str, float | None], cores: int, trust_s: float = TRUST_S) -> None:
         usual_s = fmean([seconds for seconds in expected.values() if seconds is not None])

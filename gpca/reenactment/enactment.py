@@ -1,8 +1,4 @@
-"""The truth's counterfactuals under hypotheses of an observer: v̂, û and φ̂.
-
-A hypothesis says which observed points are outliers, how large the noise is and which part of the surface is missing.
-From this the pair is rebuilt without each of its causes, and registered again.
-"""
+"""The truth's counterfactuals under hypotheses of an observer: v̂, û and φ̂."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -137,10 +133,7 @@ def rebuild(T: np.ndarray, observation: Observation, surface: ModelSurface, rand
 
 
 def is_whole(surface: ModelSurface, is_lone: np.ndarray) -> bool:
-    """Return whether next to none of the points (N,) lie on surface that the model lacks.
-
-    A symmetric model stays one: what is observed beside it may be another thing.
-    """
+    """Return whether next to none of the points (N,) lie on surface that the model lacks."""
     return bool(is_lone.mean() < LEAST_LACKING) or surface.symmetric
 
 

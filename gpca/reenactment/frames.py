@@ -1,8 +1,4 @@
-"""Re-enactments in depth frames: what an observer with the camera knows, hypotheses, and their counterfactuals.
-
-As for whole objects, but the mixture is around the points that would be seen at a pose, and whatever stands in front
-hides the others. At a wrong pose another side would be seen, or much of it where nothing was measured.
-"""
+"""Re-enactments in depth frames: what an observer with the camera knows, hypotheses, and their counterfactuals."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

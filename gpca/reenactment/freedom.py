@@ -31,11 +31,7 @@ OUTLINE = 0.2  # of its longest extent, that a neighborhood of an outline is wid
 
 @dataclass(frozen=True)
 class Freedom:
-    """The six directions of a pose; the last three are those out of the plane of outlines.
-
-    Twists are (rotation, translation) on the left of the pose, about a center, and move the observed points by 1, root
-    mean square. Lengths are in diameters.
-    """
+    """The six directions of a pose; the last three are those out of the plane of outlines."""
 
     center_3: np.ndarray
     twists_6_6: np.ndarray  # a row each

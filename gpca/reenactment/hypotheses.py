@@ -88,11 +88,7 @@ def find_hypotheses(
     random: np.random.Generator,
     evidence: Evidence | None = None,
 ) -> list[Hypothesis]:
-    """Return the probable hypotheses, the best first.
-
-    Of points (N, 3) before the registration, in the model's frame, and of poses (n, 4, 4) that registrations ended at.
-    Evidence is what else speaks for a pose, such as what a camera saw around the points.
-    """
+    """Return the probable hypotheses, the best first."""
     few, few_model = observed[np.sort(random.permutation(len(observed))[:FITTED])], surface.points[:FITTED_MODEL]
     few_spacing = surface.spacing * np.sqrt(len(surface.points) / len(few_model))
     some = few, Mixture(few_model, few_spacing / 2), ITERATIONS, densities_of(few, few_model)

@@ -86,11 +86,7 @@ class Mixture:
 
 
 def densities_of(observed: np.ndarray, model: np.ndarray) -> np.ndarray:
-    """Return how dense (LEVELS, N) surface that the model (M, 3) lacks is at observed points, for :meth:`Mixture.fit`.
-
-    It is as dense as the observed points (N, 3) are around each other, and on average no denser than the model: where
-    little of an object is observed, its points are dense.
-    """
+    """Return how dense (LEVELS, N) surface that the model (M, 3) lacks is at observed points."""
     density_L_N, typical = (np.zeros((LEVELS, len(points))) for points in (observed, model))
     for points, densities in ((observed, density_L_N), (model, typical)):
         densities_among(np.ascontiguousarray(points, np.float64), densities)

@@ -43,12 +43,7 @@ class Regions:
         return np.concatenate([distance <= reach[int(share * len(distance))] for share in PATCHES], axis=1)
 
     def likeliest(self, covered_M: np.ndarray, points: np.ndarray, noise: float) -> np.ndarray:
-        """Return which points (M,) of the model were observed: the given ones unless another region explains more.
-
-        Args:
-            covered_M: those before a plane, or all.
-            points: (N, 3) what was observed, without outliers; `noise` is theirs, a standard deviation per axis.
-        """
+        """Return which points (M,) of the model were observed: the given ones unless another region explains more."""
         few = points[np.linspace(0, len(points) - 1, min(FEW, len(points))).astype(int)]
         square_N_m = np.square(few[:, None] - self._points).sum(axis=2)
         weight_N_m = np.exp(-0.5 * (square_N_m - square_N_m.min(axis=1, keepdims=True)) / (noise**2 + self._gap**2))

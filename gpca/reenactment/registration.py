@@ -1,9 +1,4 @@
-"""The search of the re-enactment as a registration method: EM from many starts, with or without the initial pose.
-
-As in coherent point drift (Myronenko & Song 2010) and FilterReg (Gao & Tedrake 2019), the source's points are normal
-around the target's, or outliers, and expectation maximization moves the pose. Both of these climb from one start; here
-the likeliest of many ends is the result (:mod:`gpca.reenactment.hypotheses`).
-"""
+"""The search of the re-enactment as a registration method: EM from many starts, with or without the initial pose."""
 
 from functools import partial
 from typing import Annotated

@@ -61,11 +61,7 @@ class Scale:
 def find_scale(
     observed: np.ndarray, T_k: Sequence[np.ndarray], surface: ModelSurface, random: np.random.Generator
 ) -> Scale:
-    """Return the scale of an observed cloud (N, 3) relative to a surface, from probable poses (4, 4).
-
-    Poses of a cloud of a wrong scale may be wrong, so the cloud is rescaled and its poses are sought again, until its
-    scale is right.
-    """
+    """Return the scale of an observed cloud (N, 3) relative to a surface, from probable poses (4, 4)."""
     scale = scale_of([transform(T, observed) for T in T_k], surface, random)
     center, factor = observed.mean(axis=0), scale.factor
     for _ in range(ROUNDS if scale.off else 0):
@@ -163,10 +159,7 @@ def _steps(moved: np.ndarray, normals: np.ndarray, residual: np.ndarray, weight:
 
 
 def _scale_of_model(seen: np.ndarray, surface: ModelSurface, random: np.random.Generator) -> float:
-    """Return the scale at which points of the model that lie near some (N, 3) fit planes of their neighbors.
-
-    Planes through points of a bent surface lie inside it, and noise carries points outside: both make the scale small.
-    """
+    """Return the scale at which points of the model that lie near some (N, 3) fit planes of their neighbors."""
     points = surface.points
     near_M = cKDTree(seen).query(points, distance_upper_bound=2 * surface.spacing)[0] < np.inf
     kept = points[near_M] if near_M.sum() > 32 else points

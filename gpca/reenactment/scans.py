@@ -1,8 +1,4 @@
-"""Re-enactments of registrations of scans: the counterfactuals of scans, at hypotheses of the true pose.
-
-As for whole objects, but neither scan holds all of the other, so both are cropped to what they have in common under a
-hypothesis. Noise is taken away by moving the source's common points to the target's planes.
-"""
+"""Re-enactments of registrations of scans: the counterfactuals of scans, at hypotheses of the true pose."""
 
 from collections.abc import Sequence
 

@@ -1,8 +1,4 @@
-"""A model cloud as a surface: local planes, spacing, roughness, and which part of it an observation misses.
-
-All lengths are relative to the diameter, all points lie in the model's frame. The missing part is a half-space, the one
-that takes most of the model and next to nothing observed, unless another region explains more.
-"""
+"""A model cloud as a surface: local planes, spacing, roughness, and which part of it an observation misses."""
 
 from __future__ import annotations
 
@@ -57,10 +53,7 @@ class ModelSurface:
 
     @cached_property
     def symmetries(self) -> dict[str, list]:
-        """The turns that leave the shape as it is (:func:`gpca.objects.bop.find_symmetries`).
-
-        Distances are from the surface: those to the points would hide a handle that is no larger than their spacing.
-        """
+        """The turns that leave the shape as it is (:func:`gpca.objects.bop.find_symmetries`)."""
         limit = SYMMETRIC + SPARSE * self.spacing + NOISY * self.noise
         centered = self.points[:JUDGED] - self.center
         return find_symmetries(centered, 1.0, lambda points: self.distances(points + self.center), limit)
@@ -82,10 +75,7 @@ class ModelSurface:
         return dots(points - self.centers[rows], self.normals[rows]), rows
 
     def distances(self, points: np.ndarray) -> np.ndarray:
-        """Return the distances (N,) of points (N, 3) from the surface.
-
-        They are from the plane of the nearest model point, and along it as far as the points' spacing does not reach.
-        """
+        """Return the distances (N,) of points (N, 3) from the surface."""
         target, _, normals, reach = self._target
         distance_N = np.empty(len(points))
         surface_distances(np.ascontiguousarray(points), target, normals, reach, distance_N)
@@ -107,11 +97,7 @@ class ModelSurface:
         return whole
 
     def apart(self, T_between_n: np.ndarray) -> np.ndarray:
-        """Return how far (n,) the surface lies from itself after each motion (n, 4, 4).
-
-        It is the mean distance, or a share of that of the farthest part: a lid or a handle elsewhere is another pose,
-        although most of the surface stays where it was.
-        """
+        """Return how far (n,) the surface lies from itself after each motion (n, 4, 4)."""
         points = self.points[:COMPARED]
         distance_n_P = self.distances(_moved(T_between_n, points).reshape(-1, 3)).reshape(len(T_between_n), -1)
         distance_n_P.partition(farthest := int(PART * len(points)), axis=1)
@@ -157,10 +143,7 @@ LEAST_KEPT = 0.125  # of the model
 
 
 def share_within(model: np.ndarray, observed: np.ndarray, noise: float, random: np.random.Generator) -> float:
-    """Return the least share of a model (M, 3) before any plane that what was observed (N, 3) does not pass.
-
-    Noise carries observed points beyond the true edge, so this is an upper bound of what is covered.
-    """
+    """Return the least share of a model (M, 3) before any plane that what was observed (N, 3) does not pass."""
     return _cut(model, observed, noise * random.normal(size=len(model)))[1]
 
 
@@ -172,10 +155,7 @@ def covered_points(
 
 
 def before_plane(model: np.ndarray, observed: np.ndarray, noise: float, random: np.random.Generator) -> np.ndarray:
-    """Return which points of a model (M, 3) lie on the side of the plane that was observed, (M,) bool.
-
-    The model is blurred as much as what was observed, (N, 3) without outliers; what of it reaches as far is covered.
-    """
+    """Return which points of a model (M, 3) lie on the side of the plane that was observed, (M,) bool."""
     blur_M = noise * random.normal(size=len(model))
     direction, share, limit = _cut(model, observed, blur_M)
     if share > 1 - LEAST_SHARE:

@@ -133,12 +133,7 @@ def disturbed(pair: ScanPair, rung: Rung, *axes: object) -> np.ndarray:
 
 @dataclass(frozen=True)
 class ScanSuccess:
-    """Limits of the RMSE over the true overlap, above which a registration has failed.
-
-    That is the criterion of 3DMatch (Zeng et al. 2017, after Choi et al. 2015): 0.2 m over the true correspondences.
-    Here they are each point and its true place, as in the benchmark's code, which evaluates the same sum to second
-    order from a 6×6 matrix of each pair.
-    """
+    """Limits of the RMSE over the true overlap, above which a registration has failed (3DMatch, Zeng et al. 2017)."""
 
     room_m: Positive = 0.2  # in rooms
     object_share: PositiveShare = 0.02  # of objects, relative to their size

@@ -1,10 +1,4 @@
-"""Configured data sets of scans: the entry in the config, where its files are, and their readers (docs/real_world.md).
-
-npz: one scene in each file; beside them, ``pairs.csv`` may list pairs. ply_folder: one scene in each folder with
-``poses.txt``. threedmatch: the benchmark of Zeng et al. 2017 in the layout of Choi et al. 2015, where ``gt.log`` has
-five lines for each pair (target, source, number of fragments; then T_target_source), and ``gt_overlap.log`` beside
-it lines ``target,source,overlap``, as Huang et al. 2021 made them for this benchmark and for 3DLoMatch.
-"""
+"""Configured data sets of scans: entries of the config, where files are, and readers (docs/real_world.md)."""
 
 import zipfile
 from collections.abc import Callable, Iterator, Mapping

@@ -1,9 +1,4 @@
-"""Virtual scenes: furnished rooms and compound objects, scanned by the virtual depth camera from several places.
-
-A scene is named by its number, from which all of it is drawn; those of development have numbers from 100 on. A scan
-of a room is what a camera sees that turns on its way through the room; a scan of an object is what one sees on a
-circle around it. In rooms the camera has half of its noise, as fragments of rooms are fused from many frames.
-"""
+"""Virtual scenes: furnished rooms and compound objects, scanned by the virtual depth camera from several places."""
 
 from collections.abc import Iterator
 

@@ -1,7 +1,4 @@
-"""Scores of methods on the test samples of a track, with intervals over clusters and seeds, and paired differences.
-
-All methods are measured on the same samples and the same bootstrap draws.
-"""
+"""Scores of methods on the test samples of a track, with intervals over clusters and seeds, and paired differences."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -64,11 +61,7 @@ def score(published: Published, submitted: Mapping[str, Method]) -> tuple[Frame,
 
 
 def groups_of(published: Published) -> Iterator[Group]:
-    """Yield each separately scored group: name, rows, and their draws, which are those of the run's tables.
-
-    Groups are the kinds of starts of depth frames, in which an instance counts once whatever its number of starts, and
-    the data sets of scans, also pooled.
-    """
+    """Yield each separately scored group: name, rows, and their draws, which are those of the run's tables."""
     rows, track = published.rows, published.track
 
     def group(name: str, mask_N: np.ndarray, cluster_N: np.ndarray, *axes: str) -> Group:

@@ -1,16 +1,4 @@
-"""A submission: a CSV of predictions with a head of comments about the method, and a row per test sample.
-
-::
-
-    # track: causes
-    # version: 0123456789ab
-    # method: My method
-    # authors: A. Author, B. Author
-    # link: https://github.com/author/my-method
-    # seconds: 0.02
-    # hardware: two cores of a laptop
-    source,seed,sample,score_nominal,score_noise,score_pose,score_overlap
-"""
+"""A submission: a CSV of predictions, a row per test sample, with a head of comments (docs/adding.md)."""
 
 import csv
 from collections.abc import Mapping
