@@ -45,6 +45,14 @@ def test_every_relative_link_leads_to_a_file_and_a_heading_of_it(page):
         assert not anchor or anchor in anchors(file), link
 
 
+def test_every_page_that_code_and_configs_name_is_there():
+    named = {}
+    for path in our_files():
+        if path.suffix in (".py", ".yaml", ".smk") and "tests" not in path.parts:
+            named |= dict.fromkeys(re.findall(r"(?<!/)docs/\w+\.md", path.read_text()), path)
+    assert [f"{relative(path)}: {page}" for page, path in named.items() if not (ROOT / page).is_file()] == []
+
+
 @pytest.mark.parametrize("command", commands("make "))
 def test_every_make_target_and_variable_exists(command):
     makefile = (ROOT / "Makefile").read_text()

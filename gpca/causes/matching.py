@@ -1,4 +1,4 @@
-"""Matches samples by their trivial numbers, so that these know nothing of the dominant cause (docs/controls.md).
+"""Matches samples by their trivial numbers, so that these know nothing of the dominant cause (docs/appendix.md).
 
 Let g(c | x) be the probability of a cause, were all equally frequent, of a candidate with trivial numbers x. Accepting
 candidates of cause c with probability min g / g(c) leaves every cause with the same distribution of x; where min g is

@@ -57,8 +57,12 @@ class Staged:
             if column not in predictions:
                 raise InputError(predictions_csv, f"column '{column}' is missing", "give predictions of GP-CA")
             predictions[column] = numbers(predictions_csv, predictions, column)
-        uncertain = observed_uncertainties(uncertainty_csv, registrations)
-        return cls(registrations, h_S_d, predictions, *uncertain, Limits(**limits))
+        observed, u_clean = read_uncertainties(uncertainty_csv)
+        samples = list(zip(registrations.split.tolist(), registrations.sample.astype(str).tolist(), strict=True))
+        u_S = observed.reindex(samples).to_numpy(float)
+        if np.isnan(u_S).all():
+            raise InputError(uncertainty_csv, "its samples differ from those of the registrations", "regenerate both")
+        return cls(registrations, h_S_d, predictions, u_S, u_clean, Limits(**limits))
 
     def choose(self, concept: str, path: str | Path, *others: str) -> int:
         """Row of the sample that is shown: a test sample of the concept whose registration is uncertain.
@@ -83,12 +87,15 @@ class Staged:
         return _median(uncertain if len(uncertain) else worst, concept)
 
     def error(self, row: int) -> float:
-        """Error of a row after ICP, in diameters."""
-        return registration_error(self.registrations, row)
+        """ADD-S of a row's pose after ICP in diameters; of clouds this sparse it is about 0.01 at best."""
+        T_icp, T_true = (self.registrations.T_target_source(which, row) for which in ("icp", "true"))
+        return adds_error(transform(inverse(T_true), self.registrations.target(row)), T_icp, T_true)
 
     def state(self, row: int) -> str:
-        """State of a row after ICP, by its error."""
-        return state_of_error(self.error(row), self.limits)
+        """State of a row after ICP, by its error alone."""
+        if (error := self.error(row)) < self.limits.nominal:
+            return NOMINAL
+        return FAILED if error > self.limits.failed else BORDERLINE
 
     def clouds(self, row: int, which: str) -> tuple[np.ndarray, np.ndarray]:
         """Target and source (·, 3) of a row, the source at the pose ``init`` or ``icp``."""
@@ -139,29 +146,6 @@ def severity_text(registrations: Registrations, sample: int, concept: str) -> st
         angle_deg = np.degrees(registrations.severity_rotation_rad[sample])
         return f"{angle_deg:.0f}° and {100 * registrations.severity_translation[sample]:.0f} % $d$"
     return f"{100 * registrations.severity_crop[sample]:.0f} % cut off"
-
-
-def registration_error(registrations: Registrations, row: int) -> float:
-    """ADD-S of a row's pose after ICP in diameters; of clouds this sparse it is about 0.01 at best."""
-    T_icp, T_true = (registrations.T_target_source(which, row) for which in ("icp", "true"))
-    return adds_error(transform(inverse(T_true), registrations.target(row)), T_icp, T_true)
-
-
-def state_of_error(error: float, limits: Limits) -> str:
-    """``nominal``, ``borderline`` or ``failed`` by the limits of docs/causes.md, without the uncertainty's."""
-    if error < limits.nominal:
-        return NOMINAL
-    return FAILED if error > limits.failed else BORDERLINE
-
-
-def observed_uncertainties(path: str | Path, registrations: Registrations) -> tuple[np.ndarray, float]:
-    """u (S,) of the registrations in nats, NaN where the file has none, and the limit of the clean ones."""
-    observed, limit = read_uncertainties(path)
-    samples = list(zip(registrations.split.tolist(), registrations.sample.astype(str).tolist(), strict=True))
-    u_S = observed.reindex(samples).to_numpy(float)
-    if np.isnan(u_S).all():
-        raise InputError(path, "its samples differ from those of the registrations", "regenerate both")
-    return u_S, limit
 
 
 def _median(rows: Frame, concept: str) -> int:
