@@ -105,11 +105,7 @@ def initial_gpc(task: LabelingTask[np.ndarray], settings: ActiveLearningSettings
 
 
 def rounds(
-    task: LabelingTask[Projection],
-    gpc: GPC,
-    strategy: str,
-    settings: ActiveLearningSettings,
-    *axes: object,
+    task: LabelingTask[Projection], gpc: GPC, strategy: str, settings: ActiveLearningSettings, *axes: object
 ) -> Iterator[tuple[dict[str, float], list[int]]]:
     """Yield a step per round, the first before any label, and the rows of the pool labeled so far.
 

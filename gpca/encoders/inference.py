@@ -69,10 +69,8 @@ class TrainedEncoder:
 
             with torch.device("meta"):  # the options may ask for more than the memory
                 module = make_encoder(self.settings.backbone, self.settings.options)
-            shapes, size = (
-                {name: tuple(part.shape) for name, part in module.state_dict().items()},
-                module.embedding_size,
-            )
+            shapes = {name: tuple(part.shape) for name, part in module.state_dict().items()}
+            size = module.embedding_size
         require_shapes(self.weights, shapes, "encoder")
         return size
 

@@ -285,10 +285,7 @@ def write_weights(path: str | Path, model: Classifier, axes: Axes) -> None:
 
 
 def load_model(
-    path: Path,
-    settings: EncoderSettings,
-    classes: tuple[str, ...] = CONCEPTS,
-    axes: Axes | None = None,
+    path: Path, settings: EncoderSettings, classes: tuple[str, ...] = CONCEPTS, axes: Axes | None = None
 ) -> Classifier:
     """Load encoder and head for inference; source and seed of their samples have to be `axes`."""
     model = make_model(settings, classes)

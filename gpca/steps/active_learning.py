@@ -1,8 +1,7 @@
 """The steps of active learning: encoders that never saw a concept, and learning curves of it, also on depth frames."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -101,7 +100,9 @@ def learn_on_frames(job: Job) -> None:
     axes = (job.source, job.seed)
     with record_provenance(job.out, inputs, job.settings, seed=job.seed):
         settings = read_settings(FrameLabelSettings, job.section("frame_labels"))
-        budget = rounds_of(settings, job.section("active_learning").get("rare") or {})
+        # Rounds as those of a concept that is rare on whole objects, with the budget of frames.
+        rare = fields_of(job.section("active_learning").get("rare") or {}, RetrainingSettings)
+        budget = read_settings(RetrainingSettings, rare | {"labels": settings.labels, "least": settings.least})
         start = ActiveLearningSettings(initial=settings.initial)
         curves: dict[str, dict] = {strategy: {} for strategy in job.strategies}
         for name, samples in progress(_embedded(job, settings.points), f"labels of {job.source}"):
@@ -117,12 +118,6 @@ def learn_on_frames(job: Job) -> None:
                     curves[strategy][name, concept] = curve
         for strategy, path in zip(job.strategies, job.out, strict=True):
             write_curves(path, curves[strategy], POOL_COLUMNS)
-
-
-def rounds_of(settings: FrameLabelSettings, rare: Mapping[str, Any]) -> RetrainingSettings:
-    """Rounds as those of a concept that is rare on whole objects, with the budget of frames."""
-    shared = fields_of(rare, RetrainingSettings)
-    return read_settings(RetrainingSettings, shared | {"labels": settings.labels, "least": settings.least})
 
 
 def _embedded(job: Job, points: int) -> Iterator[tuple[str, Embedded]]:

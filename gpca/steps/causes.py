@@ -112,10 +112,8 @@ def model(job: Job) -> None:
             causes = Causes.load(path)
             reenactments = Reenactments.load(enacted, causes.registrations)
             sets.append(TrainingSet.of(causes, reenactments))
-            objects = ObjectClouds.load(
-                objects_path, causes.registrations.axes[0] if causes.registrations.axes else None
-            )
-            errors = pose_errors(causes, objects)
+            axes_of = causes.registrations.axes
+            errors = pose_errors(causes, ObjectClouds.load(objects_path, axes_of[0] if axes_of else None))
             proposals.append(proposed_for_all(causes, reenactments, errors, truth.icp, truth.moved))
         diagnoser, bald_N, result_N_of = learn(
             TrainingSet.joined(sets),

@@ -232,9 +232,7 @@ def run(job: Job) -> None:
 
 
 def try_estimators(
-    situations: DrawnCauses,
-    estimators: Mapping[str, Mapping],
-    settings: EstimatorPairSettings,
+    situations: DrawnCauses, estimators: Mapping[str, Mapping], settings: EstimatorPairSettings
 ) -> tuple[dict[str, Frame], list[EstimatedRow]]:
     """Return the rows of each reference and estimator, one per registration, with seconds; and the registrations."""
     import pandas as pd

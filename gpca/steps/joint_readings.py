@@ -239,21 +239,15 @@ def _label_values(
             "random": (replace(settings.labels, batch=RANDOM_ROUND, labels=len(task.pool)), settings.target),
         }
         for strategy, (budget, end) in budgets.items():
-            steps: list[dict[str, float]] = []
-            at_target: list[int] = []  # rows of the pool that are labeled at the target
+            steps = []  # and the rows of the pool that are labeled then
             for step, rows in rounds(task.project(gpc), gpc, strategy, budget, *samples.axes, "reading"):
-                if all(before["accuracy"] < settings.target for before in steps):
-                    at_target = list(rows)
-                steps.append(step)
+                steps.append((step, rows))
                 if step["accuracy"] >= end:
                     break
-            hits = [step["accuracy"] >= settings.target for step in steps]
-            last = hits.index(True) if any(hits) else len(steps) - 1  # a lower bound where the target is missed
-            metrics = {
-                "labels_to_target": float(steps[last]["labels"]),
-                "reached": float(any(hits)),
-                "final_accuracy": float(steps[-1]["accuracy"]),
-            }
+            hits = [step["accuracy"] >= settings.target for step, _ in steps]
+            last, at_target = steps[hits.index(True) if any(hits) else -1]  # a lower bound where the target is missed
+            metrics = {"labels_to_target": float(last["labels"]), "reached": float(any(hits))}
+            metrics["final_accuracy"] = float(steps[-1][0]["accuracy"])
             if strategy == "bald_kmeans":  # passes over these labels, or all, to a new classifier's target accuracy
                 anew = StartedGPC(with_kernel, joint, *samples.axes, "epochs", NEW)
                 most = with_kernel.iterations

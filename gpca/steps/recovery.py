@@ -34,14 +34,7 @@ from gpca.recovery.chances import learn_utility
 from gpca.recovery.episodes import Attempt, Episode, find_episodes, register_first
 from gpca.recovery.loop import Loop, Reenactor, calibrated_alarm
 from gpca.recovery.policies import Means, PolicyEntry, policy_entry
-from gpca.recovery.rehearsal import (
-    Rehearsal,
-    rehearse,
-    rehearsed_gate,
-    rehearsed_order,
-    robot_policy,
-    summary,
-)
+from gpca.recovery.rehearsal import Rehearsal, rehearse, rehearsed_gate, rehearsed_order, robot_policy, summary
 from gpca.recovery.settings import LoopSettings, RecoverySettings
 from gpca.rigid import inverse
 from gpca.seeds import generator

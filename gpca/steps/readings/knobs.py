@@ -112,15 +112,10 @@ def _steps(pair: tuple, settings: UncertaintySettings) -> dict[str, np.ndarray]:
     moved = [knob_runs.runs(Knobs(*condition)) for condition in conditions]
     spread_K = np.array([runs.covariance(T_ref) for runs, _ in moved])
     distance = settings.icp.correspondence_distance
-    best = [runs.T_target_source_n[runs.cost_n(distance).argmin()] for runs, _ in moved]
+    best = [(runs.T_target_source_n[runs.cost_n(distance).argmin()], cKDTree(source)) for runs, source in moved]
     return {quantity: _worth(spread_K, quantity, settings.floor) for quantity in WORTHS} | {
         "trace": np.trace(spread_K, axis1=1, axis2=2),
-        "residual": np.array(
-            [
-                log_residual(transform(inverse(T), target), cKDTree(source))
-                for T, (_, source) in zip(best, moved, strict=True)
-            ]
-        ),
+        "residual": np.array([log_residual(transform(inverse(T), target), tree) for T, tree in best]),
         "inlier_rmse": np.array([runs.inlier_rmse_n.mean() for runs, _ in moved]),
         "inlier_rmse_of_one": np.array([runs.inlier_rmse_n[0] for runs, _ in moved]),
     }
