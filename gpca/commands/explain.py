@@ -17,7 +17,6 @@ from gpca.commands.explain_inputs import COLUMNS, FILES, Inputs, from_rows, from
 from gpca.errors import InputError
 from gpca.io.files import printable, require_apart
 from gpca.jobs.arguments import length
-from gpca.model.clouds import require_format
 from gpca.model.location import model_path, require_model
 from gpca.objects.surface import METERS_PER_UNIT
 
@@ -109,13 +108,9 @@ def run_explain(options: Namespace) -> int:
             print(f"gpca {options.command}: {place}{fault}", file=sys.stderr)
 
     if inputs:
-        require_format(options.target)
-        for each in inputs if not options.json_lines else ():
-            require_format(each.source)
         read_target(options.target)
     for each in inputs:
         with its_line(each.source, each.target):
-            require_format(each.source)
             given.append((each, each.read(read_target)))
     if not given and not rows:
         return FAULTY_STATUS
