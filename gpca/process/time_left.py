@@ -20,19 +20,24 @@ TRUST_S = 120.0  # core time after which the speeds of this and the measured mac
 _PROGRESS = "progress"  # Snakemake's event of its count of jobs
 
 
-class TimeLeft:
-    """Work that is left, in seconds of one core, on as many one-core jobs side by side as there are cores."""
+class TimeLeft(logging.Handler):
+    """Says how long the work left takes, on one-core jobs side by side, after Snakemake's counts of jobs."""
 
-    def __init__(self, expected: Mapping[str, float | None], cores: int, trust_s: float = TRUST_S) -> None:
+    def __init__(
+        self,
+        expected: Mapping[str, float | None],
+        cores: int,
+        has_ended: Callable[[str], bool],
+        say: Callable[[str], object],
+        trust_s: float = TRUST_S,
+        clock: Callable[[], float] = monotonic,
+    ) -> None:
+        super().__init__(logging.INFO)
         usual_s = fmean([seconds for seconds in expected.values() if seconds is not None])
         self._left = {job: usual_s if seconds is None else seconds for job, seconds in expected.items()}
-        self._cores = cores
+        self._cores, self._has_ended, self._say, self._clock = cores, has_ended, say, clock
         self._expected_s = self._took_s = trust_s
-
-    @property
-    def jobs(self) -> list[str]:
-        """The jobs that have not ended."""
-        return list(self._left)
+        self._reported_s = clock()
 
     def finish(self, job: str, took_s: float | None) -> None:
         """Note that a job has ended, and the seconds that it took, if known."""
@@ -46,29 +51,14 @@ class TimeLeft:
         longest_s = max(self._left.values(), default=0.0)
         return max(sum(self._left.values()) / self._cores, longest_s) * self._took_s / self._expected_s
 
-
-class TimeLeftHandler(logging.Handler):
-    """Writes a line about the time left after Snakemake's counts of jobs, at most every `EVERY_S`."""
-
-    def __init__(
-        self,
-        time_left: TimeLeft,
-        has_ended: Callable[[str], bool],
-        say: Callable[[str], object],
-        clock: Callable[[], float] = monotonic,
-    ) -> None:
-        super().__init__(logging.INFO)
-        self._time_left, self._has_ended, self._say, self._clock = time_left, has_ended, say, clock
-        self._reported_s = clock()
-
     def emit(self, record: logging.LogRecord) -> None:
         """Handle a message of Snakemake; all but its counts of jobs are ignored."""
         if getattr(record, "event", None) != _PROGRESS or self._clock() - self._reported_s < EVERY_S:
             return
         self._reported_s = self._clock()
-        for job in filter(self._has_ended, self._time_left.jobs):
-            self._time_left.finish(job, seconds_of(job))
-        self._say(in_words(self._time_left.seconds()))
+        for job in [*filter(self._has_ended, self._left)]:
+            self.finish(job, seconds_of(job))
+        self._say(in_words(self.seconds()))
 
 
 def tell_time_left(workflow: Any, run: str) -> None:
@@ -86,11 +76,13 @@ def tell_time_left(workflow: Any, run: str) -> None:
         return
     side_by_side = workflow.cores if workflow.local_exec else workflow.nodes
     measured = run in times or any(before.values())
-    time_left = TimeLeft(expected, max(1, min(int(side_by_side or 1), len(jobs))), TRUST_S if measured else 1.0)
+    cores = max(1, min(int(side_by_side or 1), len(jobs)))
     say = partial(logger.info, extra={"quietness": Quietness.PROGRESS})
+    trust_s = TRUST_S if measured else 1.0
+    time_left = TimeLeft(expected, cores, lambda path: workflow.dag.finished(jobs[path]), say, trust_s)
     if measured:
         say(in_words(time_left.seconds()))
-    logger.addHandler(TimeLeftHandler(time_left, lambda path: workflow.dag.finished(jobs[path]), say))
+    logger.addHandler(time_left)
 
 
 def seconds_of(benchmark: str | Path) -> float | None:

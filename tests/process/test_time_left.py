@@ -4,7 +4,7 @@ from types import SimpleNamespace
 import pytest
 
 from gpca.process import time_left
-from gpca.process.time_left import TIMES, TimeLeft, TimeLeftHandler, in_words, read_times, seconds_of, tell_time_left
+from gpca.process.time_left import TIMES, TimeLeft, in_words, read_times, seconds_of, tell_time_left
 
 from ..documents import ROOT
 
@@ -18,28 +18,27 @@ def count_of_jobs():
 
 
 def test_the_time_left_is_the_work_for_each_core_or_the_longest_job():
-    left = TimeLeft({"a": 30.0, "b": 60.0, "c": None}, 2)
+    left = TimeLeft({"a": 30.0, "b": 60.0, "c": None}, 2, bool, print)
     assert left.seconds() == pytest.approx((30 + 60 + 45) / 2)  # nobody knows of c, so it is as the others are
     left.finish("a", None)
     left.finish("c", None)
     assert left.seconds() == 60
-    assert left.jobs == ["b"]
     left.finish("b", None)
     assert left.seconds() == 0
 
 
 def test_jobs_that_have_ended_correct_what_is_expected_of_the_others():
-    left = TimeLeft({"a": 120.0, "b": 120.0}, 1, trust_s=120.0)
+    left = TimeLeft({"a": 120.0, "b": 120.0}, 1, bool, print, trust_s=120.0)
     left.finish("a", 240.0)
     assert left.seconds() == pytest.approx(120 * 360 / 240)
-    other = TimeLeft({"a": 120.0, "b": 120.0}, 1, trust_s=1e-9)
+    other = TimeLeft({"a": 120.0, "b": 120.0}, 1, bool, print, trust_s=1e-9)
     other.finish("a", 240.0)
     assert other.seconds() == pytest.approx(240)
 
 
 def test_a_line_follows_a_count_of_jobs_but_not_each():
     now, ended, lines = [0.0], set(), []
-    handler = TimeLeftHandler(TimeLeft({"a": 600.0, "b": 600.0}, 1), ended.__contains__, lines.append, lambda: now[0])
+    handler = TimeLeft({"a": 600.0, "b": 600.0}, 1, ended.__contains__, lines.append, clock=lambda: now[0])
     handler.emit(count_of_jobs())
     assert lines == []
     now[0] = 30.0
