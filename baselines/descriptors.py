@@ -1,14 +1,9 @@
-"""Explainers of causes on the descriptors of a pair (:mod:`gpca.causes.descriptors`) or on its re-enactment.
+"""Explainers of causes on the descriptors of a pair, or on its re-enactment (docs/causes.md).
 
-``pair_forest`` reads 52 distances, ICP's motion, fitness and spread; ``pair_boosting`` reads every descriptor.
-``gpca_pair`` is GP-CA's multi-class classifier. ``pair_committee`` averages a forest, boosting and GP-CA. Names that
-end in ``_clouds`` see the two clouds after ICP alone. ``trees_on_*`` and ``gpca_on_*`` measure what each part is worth,
-in the order of cost; runs from other starts and remedies without restarts cost the same with the default settings.
-
-``alarm_*`` say whether two clouds are aligned, and name no cause. ``alarm_entropies`` is CorAl (Adolfsson et al. 2021):
-a regression on the mean entropy of the clouds, joint and apart. ``alarm_features`` reads features like FACT's (Dillén,
-Forssén & Edstedt 2025): local features of both aligned clouds, their distances, and the share seen in both; boosted
-trees replace its network. ``reenact`` and ``reenact_committee`` read a re-enactment of the pair (docs/causes.md).
+Names that end in ``_clouds`` see the two clouds after ICP alone; ``trees_on_*`` and ``gpca_on_*`` measure the worth of
+each part, in the order of cost. ``alarm_*`` name no cause: ``alarm_entropies`` is CorAl (Adolfsson et al. 2021), a
+regression on the mean entropies of the clouds, joint and apart; ``alarm_features`` reads features like FACT's (Dillén,
+Forssén & Edstedt 2025), with boosted trees in place of its network.
 """
 
 from collections.abc import Callable

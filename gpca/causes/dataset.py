@@ -20,30 +20,22 @@ HIDDEN = ("causes", "error_shown")  # arrays attached to registrations that expl
 
 @dataclass(frozen=True)
 class Causes(Container):
-    """S registrations, of which T are for testing, with their truth.
+    """S registrations, of which T are for testing, with their truth."""
 
-    Attributes:
-        registrations: as everywhere, the observed cloud is the source and the model the target: the source lies where
-            ICP put it, in the model's frame. ICP itself ran the other way. ``concept`` is the one that adds most to the
-            error, in any state; only for the failed does it mean much.
-        truth_again: of the T test samples, measured from other starts: how well anything could do.
-        T_target_source_runs: what ICP found from n starts around the initial pose, in meters; the first is the initial
-            pose itself. They are for explainers, and not the runs that the truth was measured by.
-        error_shown: min(ADD(-S), d/2) / d of the registration that is shown, the first of these runs. The truth is a
-            mean over others, so this one may be right where the truth says failed, and the reverse.
-    """
-
+    # The observed cloud is the source and lies where ICP put it, in the model's frame. ICP itself ran the other way.
+    # ``concept`` is what adds most to the error, in any state.
     registrations: Registrations
     truth: Truth
-    truth_again: Truth
+    truth_again: Truth  # of the T test samples, measured from other starts: how well anything could do
     applied: np.ndarray = array("S 3", FLAG)
     symmetric: np.ndarray = array("S", FLAG)  # the error is ADD-S
     severity_outliers: np.ndarray = array("S")  # share of the points, 0 where noise was not applied
     candidate: np.ndarray = array("S", WHOLE)  # its number within its split
+    # What ICP found from n starts around the initial pose, in meters; the first is that pose. The truth has other runs.
     T_target_source_runs: np.ndarray = array("S n 4 4")
     fitness_runs: np.ndarray = array("S n")
     inlier_rmse_runs: np.ndarray = array("S n")
-    error_shown: np.ndarray = array("S")
+    error_shown: np.ndarray = array("S")  # min(ADD(-S), d/2) / d of the first of these runs, which is shown
 
     def rows(self, split: str) -> np.ndarray:
         """Return the row numbers of a split."""

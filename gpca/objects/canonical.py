@@ -1,15 +1,8 @@
 """Surfaces into canonical clouds: sampled uniformly, centered on the bounding box, measured by diameter, checked.
 
-Samples that show objects of one family of shapes, or one scene, form a *cluster*. Clusters are never split between
-training and test where objects or scenes are unseen, and intervals are over clusters. The clusters of a source are
-dealt into *folds*, drawn or read from files; each seed leaves one fold unseen. Columns of the files:
-
-    objects: source, object, name, family, role, fold
-    scenes:  dataset, scene, role, fold[, truth, estimates]
-
-The role is ``development`` (settings are chosen on it), ``evaluation`` or, of objects, ``unused``. The true poses of
-a scene were ``annotated`` or made by ``icp``; poses of estimators are from the same ``image`` or were ``carried``
-over from another one of the sequence.
+Samples that show objects of one family of shapes, or one scene, form a *cluster*, which is never split between training
+and test where objects or scenes are unseen. Clusters are dealt into *folds*, drawn or read from files (data/README.md);
+each seed leaves one fold unseen. The role is ``development`` (settings are chosen on it), ``evaluation`` or ``unused``.
 """
 
 from __future__ import annotations

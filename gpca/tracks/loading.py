@@ -21,30 +21,19 @@ NO_LABEL = NOTHING_NAMED  # of borderline samples, which no measure counts
 
 @dataclass(frozen=True)
 class TrackData:
-    """S registrations of a track. Lengths are relative to the object's diameter.
-
-    Attributes:
-        split: None for both.
-        version: identifier of the published samples.
-        registrations: clouds, poses and ICP's results (:class:`gpca.pairs.dataset.Registrations`).
-        labels: (C,) possible labels.
-        label: (S,) true label; ``borderline`` between nominal and failed, which counts in no measure.
-        error: (S, 8) mean error with each subset of the causes alone; bit i of the column number stands for cause i.
-        phi: (S, 3) contributions of noise, pose and overlap to the error.
-        causes: (S, 3) whether each is one of the causes.
-    """
+    """S registrations of a track. Lengths are relative to the object's diameter."""
 
     track: str
     source: str
-    split: str | None
+    split: str | None  # None for both
     seed: int
-    version: str
-    registrations: Registrations
-    labels: tuple[str, ...]
-    label: np.ndarray
-    error: np.ndarray
-    phi: np.ndarray
-    causes: np.ndarray
+    version: str  # of the published samples
+    registrations: Registrations  # clouds, poses and ICP's results
+    labels: tuple[str, ...]  # the C possible ones
+    label: np.ndarray  # (S,) true; ``borderline`` between nominal and failed, which counts in no measure
+    error: np.ndarray  # (S, 8) mean, with each subset of the causes alone: bit i of the column stands for cause i
+    phi: np.ndarray  # (S, 3) contributions of noise, pose and overlap to the error
+    causes: np.ndarray  # (S, 3) whether each is one of the causes
 
     def __len__(self) -> int:
         return len(self.registrations)
