@@ -64,13 +64,6 @@ def test_loops_are_kept_beside_the_module_or_where_the_variable_says(package, tm
     assert folder_of(package, NUMBA_CACHE_DIR=str(tmp_path / "mine")) == tmp_path / "mine"
 
 
-def test_a_process_keeps_to_the_folder_of_its_parent(package, tmp_path):
-    folder = imported(package, NUMBA_CACHE_DIR=str(tmp_path / "mine")).stdout
-    assert imported(package, NUMBA_CACHE_DIR=folder.strip()).stdout == folder
-    of_two_threads = folder_of(package, NUMBA_CACHE_DIR=folder.strip(), NUMBA_NUM_THREADS="2")
-    assert of_two_threads == tmp_path / "mine"
-
-
 @pytest.mark.parametrize("threads", [1, 2])
 def test_a_loop_over_clouds_is_shared_out_where_there_are_threads_for_it(monkeypatch, threads):
     monkeypatch.setenv("NUMBA_NUM_THREADS", str(threads))
@@ -95,14 +88,6 @@ def test_a_first_call_says_that_it_compiles_and_later_ones_do_not(package):
     code = "from gpca.process.compilation import say_when_compiling as say; say(); say(); "
     code += "from gpca.upper import upper; upper(1); upper(1.0)"
     assert [imported(package, code).stderr for _ in range(2)] == [f"{NOTICE}{REMEDY}\n", ""]
-
-
-def test_loops_of_others_are_kept_too(package, tmp_path_factory):
-    elsewhere = tmp_path_factory.mktemp("elsewhere")
-    (elsewhere / "theirs.py").write_text("from numba import njit\n@njit(cache=True)\ndef f(x):\n    return x\n")
-    code = f"import sys; import gpca.process.numba_cache; sys.path.insert(0, {str(elsewhere)!r})\n"
-    code += "from theirs import f; print(f(1), *f.stats.cache_hits.values())"
-    assert [imported(package, code).stdout.strip() for _ in range(2)] == ["1", "1 1"]
 
 
 def test_a_loop_is_compiled_anew_when_a_module_beneath_its_own_has_changed(package):
