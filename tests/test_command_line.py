@@ -34,13 +34,6 @@ def test_help_is_plain_text(capsys, command):
     assert not re.search(r"`|:\w+:|None", out), out
 
 
-def test_the_command_goes_by_the_name_that_it_was_called_by(capsys, monkeypatch):
-    monkeypatch.setattr(sys, "argv", ["/somewhere/bin/gpca"])
-    with pytest.raises(SystemExit):
-        main(["--help"])
-    assert capsys.readouterr().out.startswith("usage: gpca [-h] [--version] command")
-
-
 def test_the_version(capsys):
     with pytest.raises(SystemExit) as caught:
         main(["--version"])

@@ -2,9 +2,6 @@
 
 import hashlib
 import re
-import shutil
-import subprocess
-import sys
 from collections import defaultdict
 from pathlib import Path
 
@@ -55,14 +52,6 @@ def test_every_file_is_listed_with_its_checksum():
     assert sum(path.stat().st_size for path in paths) < LARGEST_BYTES
 
 
-def test_checksums_can_be_renewed_alone(tmp_path):
-    (tmp_path / "part").mkdir()
-    (tmp_path / "part/mesh.ply").write_bytes(b"ply")
-    shutil.copy(DATA / "make_data.py", tmp_path)
-    subprocess.run([sys.executable, tmp_path / "make_data.py", "--checksums"], check=True)
-    assert (tmp_path / "SHA256SUMS").read_text() == f"{hashlib.sha256(b'ply').hexdigest()}  part/mesh.ply\n"
-
-
 @pytest.mark.parametrize("part", PARTS)
 def test_every_part_has_its_license_beside_it(part):
     text = (DATA / part / "LICENSE.md").read_text()
@@ -83,12 +72,6 @@ def test_a_family_has_one_role_and_one_fold_in_all_sources():
     assert len(unused) == 2
     assert all((DATA / "ycb" / f"{name}.ply").is_file() for name in unused["object"])
     assert set(unused["family"]) <= set(used.loc[used["role"] == "evaluation", "family"])  # the reason why they are
-
-
-def test_an_object_is_in_one_source_and_the_mug_in_ycb_alone():
-    rows = read_csv(OBJECTS, ("source", "object", "name", "family", "role", "fold"))
-    assert not rows["name"].duplicated().any()
-    assert set(rows.loc[rows["name"].str.contains("mug"), "source"]) == {"ycb"}
 
 
 @pytest.mark.parametrize("config", ["sources.yaml", "development.yaml"])

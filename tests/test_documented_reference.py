@@ -117,12 +117,3 @@ def with_menu(conf, name):
     source = [(ROOT / f"{name}.md").read_text()]
     conf["with_menu"](None, name, source)
     return source[0]
-
-
-def test_every_cell_of_the_tutorial_begins_with_a_heading():
-    text = (ROOT / "docs/tutorial.py").read_text()
-    cells = re.findall(r"^# %%(.*)\n# (.+)\n# (-+)\n", text, re.MULTILINE)
-    assert len(cells) == text.count("\n# %%") > 5  # what stands behind the marks would be lost
-    assert all(not rest and len(title) == len(line) for rest, title, line in cells)
-    _, title, line, *_ = text.splitlines()
-    assert set(line) == {"="} and len(line) == len(title)

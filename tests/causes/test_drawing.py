@@ -6,7 +6,7 @@ import pytest
 
 from gpca.causes import drawing
 from gpca.causes.candidate import Registrar, Unmeasurable
-from gpca.causes.drawing import Quotas, Tally, apportion, draw_causes, group_of
+from gpca.causes.drawing import Quotas, Tally, draw_causes, group_of
 from gpca.causes.settings import CauseSettings, Shares
 from gpca.causes.truth import Truth
 from gpca.errors import InputError
@@ -133,15 +133,6 @@ def fill(quotas, *groups):
     for group in groups:
         while quotas.wants(group):
             quotas.taken[group] += 1
-
-
-@pytest.mark.parametrize("total", [6, 7, 100, 301])
-def test_parts_add_up_and_are_off_by_less_than_one(total):
-    shares = {"a": 0.3, "b": 0.16, "c": 0.18, "d": 0.18, "e": 0.18, "f": 0.0}
-    parts = apportion(total, shares)
-    assert sum(parts.values()) == total
-    assert all(abs(parts[name] - total * share) < 1 for name, share in shares.items())
-    assert parts["f"] == 0
 
 
 @pytest.mark.parametrize("order", [(False, True), (True, False)])

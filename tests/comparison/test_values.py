@@ -143,15 +143,6 @@ def test_confusions_are_shares_too_and_views_of_one_instance_are_one_object(tmp_
     assert bounds_of(ACCURACY, files) == pytest.approx(wilson_interval(2.5, 5))
 
 
-def test_of_learners_the_set_that_is_named_counts(tmp_path):
-    files = predictions(tmp_path, {"a": 1.0, "b": 0.5}, sets=("in_distribution", "severity"))
-    within = replace(ACCURACY, file="diagnostics.csv", table="learners/in_distribution")
-    beyond = replace(within, table="learners/severity")
-    found = cluster_draws([within, beyond], files)
-    assert found[within].bounds() == (0.5, 1.0)
-    assert found[beyond].bounds() == pytest.approx(wilson_interval(0, 10))
-
-
 def test_what_is_no_share_of_samples_has_none_and_files_that_are_none_are_refused(tmp_path):
     deviation = replace(ACCURACY, statistic="deviation")
     assert [folder_behind(c) for c in (None, LABELS, deviation, replace(ACCURACY, metrics=("ece",)))] == [None] * 4

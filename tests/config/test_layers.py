@@ -85,11 +85,6 @@ def test_switches_are_a_list_in_their_order_and_a_list_may_stand_in_their_place(
     assert without_false(given)["active_learning"]["strategies"] == ["bald", "random"]
 
 
-def test_virtual_frames_stay_while_a_dataset_does():
-    config = merged(load(), {"real_world": {"datasets": {"visp": False}}})
-    assert without_false(config)["real_world"]["virtual"] == load()["real_world"]["virtual"]
-
-
 @pytest.mark.parametrize(
     ("key", "message"),
     [
@@ -115,10 +110,3 @@ def test_what_cannot_be_left_out_is_one_line_that_names_the_key(key, message):
     with pytest.raises(InputError) as caught:
         check(changed(key, False))
     assert str(caught.value).startswith(f"config key {message}")
-
-
-def test_nothing_is_left():
-    config = load()
-    config["explainers"] = dict.fromkeys(config["explainers"], False)
-    with pytest.raises(InputError, match=r"^config key explainers: \{\} should have at least 1 item"):
-        check(config)

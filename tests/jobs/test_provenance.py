@@ -88,12 +88,6 @@ def test_no_checkout_and_no_git_are_no_fault(tmp_path, monkeypatch):
     assert provenance._code_version() == UNKNOWN
 
 
-def test_a_checkout_of_something_else_around_the_package_is_not_its_own(git_at, tmp_path):
-    (tmp_path / "analysis.py").write_text("one = 1\n")
-    git_at(tmp_path / "venv/site-packages", tmp_path, "analysis.py")
-    assert provenance._code_version() == UNKNOWN
-
-
 def test_a_package_without_a_lock_beside_it_has_no_hash_of_one(tmp_path, monkeypatch):
     monkeypatch.setattr(provenance, "ROOT", tmp_path)
     with record_provenance([tmp_path / "out.csv"], [], {}):

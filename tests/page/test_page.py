@@ -186,14 +186,6 @@ def test_the_dataset_of_many_rows_stands_above_them_once():
     assert table["groups"][1]["rows"][0] == [["SHAP", False], ["97.7", True]]
 
 
-def test_rows_that_share_little_or_come_back_are_one_group():
-    alone = printed(("Cups",), ("YCB",))
-    few = printed(("Cups", "SHAP"), ("Cups", "SA"), ("YCB", "SHAP"))
-    back = printed(("Cups", "SHAP"), ("Cups", "SA"), ("YCB", "SHAP"), ("YCB", "SA"), ("Cups", "All"), ("Cups", "None"))
-    for table in (alone, few, back):
-        assert in_groups(table) == table | {"groups": [{"title": "", "rows": table["rows"]}]}
-
-
 def test_texts_are_escaped_and_only_what_is_there_is_a_link(tmp_path):
     (tmp_path / "metrics.csv").write_text("")
     links = Links(tmp_path, ["table1_mine", "readings"])

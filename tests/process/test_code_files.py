@@ -78,15 +78,6 @@ def test_paths_are_those_that_the_working_directory_sees(project, tmp_path_facto
     assert code_files("gpca.middle") == [f"{project.name}/{file}" for file in files]
 
 
-def test_paths_are_sorted_and_there(monkeypatch):
-    monkeypatch.chdir(ROOT)
-    files = code_files("gpca.steps.pairs:attribute", "gpca.explainers.interface")
-    assert files == sorted(set(files))
-    for file in files:
-        assert (ROOT / file).is_file()
-        assert file.startswith(("gpca/", "baselines/"))
-
-
 STEPS = {  # module -> files that it depends on, and some that it does not
     "gpca.steps.pairs:objects": (
         {"gpca/seeds.py", "gpca/objects/source.py"},

@@ -61,8 +61,3 @@ def test_imports_that_were_kept_are_those_of_the_code_and_a_damaged_file_is_made
     kept = code_stamps.REMEMBERED.read_text()
     code_stamps.REMEMBERED.write_text(text)
     assert stamp("gpca.step").read_text() == first and code_stamps.REMEMBERED.read_text() == kept
-
-
-def test_no_partial_file_is_left(stamp):
-    path = stamp("gpca.step")
-    assert [*path.parent.iterdir()] == [path]
