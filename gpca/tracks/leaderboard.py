@@ -191,7 +191,7 @@ def boards(submissions: Mapping[str, Sequence[Submission]]) -> list[dict[str, An
 def board_of(published: Published, submissions: Sequence[Submission], links: Mapping[str, str]) -> dict[str, Any]:
     """Return the table of a track with submissions among the published rows, as the page shows it.
 
-    Its groups have rows of cells {text, bold, link}, of which the first ``labels`` are words.
+    Its groups have rows of cells {text, bold, link}, of which the first is the method.
     """
     head_of = {submission.method.name: submission.head for submission in submissions}
     submitted = {submission.method.name: submission.method for submission in submissions}
@@ -199,18 +199,19 @@ def board_of(published: Published, submissions: Sequence[Submission], links: Map
     table = table_of(published, submitted, scores, scores.iloc[:0])
     printed = table.printed()
     has_groups = bool(published.track.groups)
+    title_head, reads_head, *heads = printed["heads"][has_groups:]
     groups: dict[str, list[dict[str, Any]]] = {}
     for keys, cells in zip(table.rows, printed["rows"], strict=True):
         name = keys[-2][0]
         head = head_of.get(name, OURS)
-        shown: list[dict[str, Any]] = [{"text": text, "bold": bold} for text, bold in cells[has_groups:]]
+        title, reads, *numbers = cells[has_groups:]
+        words = [reads, *((head.get(key, "–"), False) for key in HEAD_COLUMNS)]
+        shown: list[dict[str, Any]] = [{"text": text, "bold": bold} for text, bold in (title, *numbers, *words)]
         shown[0] |= {"link": links[name]} if name in links else {}
-        shown += [{"text": head.get(key, "–"), "bold": False} for key in HEAD_COLUMNS]
         groups.setdefault(cells[0][0] if has_groups else "", []).append({"submitted": name in head_of, "cells": shown})
     return {
         "title": f"{published.track.name}: {published.track.title}",
-        "heads": [*printed["heads"][has_groups:], *(key.capitalize() for key in HEAD_COLUMNS)],
-        "labels": 2,
+        "heads": [title_head, *heads, reads_head, *(key.capitalize() for key in HEAD_COLUMNS)],
         "groups": groups,
         "notes": [f"Samples {published.version}.", *table.footnotes],
     }

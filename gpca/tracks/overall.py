@@ -82,7 +82,7 @@ def overall(
         submitted = any(name in of for _, of in tracks)
         rows.append({"submitted": submitted, "cells": [cell | {"bold": ranked.get(name) == 1} for cell in cells]})
     heads = ["Method", "Rank", "Mean AUGRC (%)", *(f"{name} (%)" for name in track_areas), "ICP runs"]
-    board = {"title": "All tracks", "heads": heads, "labels": 1, "groups": {"": rows}, "notes": NOTES}
+    board = {"title": "All tracks", "heads": heads, "groups": {"": rows}, "notes": NOTES}
     costs = [costs_of(*each, methods) for each in zip(track_areas.values(), calls_of, strict=True)]
     return board | {"costs": costs_of(means, most_calls, methods)}, costs
 
