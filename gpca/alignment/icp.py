@@ -1,7 +1,7 @@
 """Point cloud registration by ICP (Besl & McKay 1992; Chen & Medioni 1992; Segal et al. 2009) through Open3D."""
 
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
@@ -10,7 +10,6 @@ from gpca.process.environment import open3d_cloud, require_open3d
 from gpca.settings import Bounds, Count
 
 Method = Literal["point_to_point", "point_to_plane", "generalized"]
-METHODS = get_args(Method)
 CONVERGED = 1e-6  # largest change of fitness and of inlier RMSE in the last iteration; Open3D's default
 
 
@@ -21,10 +20,6 @@ class ICPSettings:
     method: Method = "point_to_point"
     correspondence_distance: Annotated[float, Bounds(exclusiveMinimum=0, maximum=10)] = 0.10  # diameters
     max_iterations: Count = 50
-
-    def __post_init__(self) -> None:
-        if self.method not in METHODS:
-            raise InputError(f"ICP method '{self.method}'", "unknown", f"choose one of {', '.join(METHODS)}")
 
 
 @dataclass(frozen=True)
@@ -43,8 +38,6 @@ class ICP:
         self, target: np.ndarray, target_normals: np.ndarray | None, settings: ICPSettings, kernel: Any = None
     ) -> None:
         self._settings = settings
-        if settings.method != "point_to_point" and target_normals is None:
-            raise InputError(f"ICP method '{settings.method}'", "the target has no normals", "use point_to_point")
         self._target = open3d_cloud(target, target_normals)
         registration = self._registration = require_open3d().pipelines.registration
         self._estimation = {

@@ -1,3 +1,5 @@
+from typing import get_args
+
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
@@ -5,7 +7,7 @@ from scipy.spatial import cKDTree
 from gpca.alignment import batched_icp
 from gpca.alignment.batched_icp import BatchedICP, BatchedPlaneICP, icp_to
 from gpca.alignment.features import estimate_normals
-from gpca.alignment.icp import ICP, METHODS, ICPSettings
+from gpca.alignment.icp import ICP, ICPSettings, Method
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Severities
 from gpca.rigid import exp
@@ -146,7 +148,7 @@ def test_with_few_lists_the_poses_are_the_same(objects, monkeypatch):
     assert_same(BatchedICP(target, ICPSettings()).register(source, starts(5)), expected)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", get_args(Method))
 @pytest.mark.parametrize(
     "faulty", [np.zeros((0, 3)), np.zeros((2, 3)), np.full((5, 3), np.nan), np.full((5, 3), np.inf)]
 )
