@@ -94,9 +94,6 @@ REDUCTIONS = {"none": None, "pca": PCA, "umap": UMAP, "autoencoder": Autoencoder
 def reduce(name: str, h_train_N_d: np.ndarray, h_S_d: np.ndarray, settings: dict, *axes: object) -> np.ndarray:
     """Fit a reduction on training embeddings and apply it: (S, components), float32; ``none`` changes nothing."""
     reduction = make_reduction(name, settings)
-    for h, role in ((h_train_N_d, "training embeddings"), (h_S_d, "embeddings")):
-        if not np.isfinite(h).all():
-            raise InputError(role, "contain NaN or infinity", "regenerate them with Snakemake")
     if reduction is None:
         return np.asarray(h_S_d, np.float32)
     require_room(name, reduction, *h_train_N_d.shape)

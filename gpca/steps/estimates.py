@@ -19,7 +19,6 @@ from gpca.causes.candidate import Candidate, drawn_again
 from gpca.causes.dataset import Causes
 from gpca.causes.descriptors import observed_pair
 from gpca.causes.settings import FEWEST_POINTS, CauseSettings
-from gpca.errors import InputError
 from gpca.io.csv_file import write_csv
 from gpca.io.frame import Frame
 from gpca.jobs.job import Job
@@ -241,8 +240,6 @@ def try_estimators(
     cases = []
     learns = any(estimator_entry(name).learn for name in estimators)
     tested = situations.causes.rows("test")
-    if not len(tested):
-        raise InputError(f"causes of {situations.source}", "have no test samples", "raise causes.test")
     for method, wanted in settings.methods.items():
         train = spaced(situations.causes.rows("train"), settings.train if learns else 0)
         examples = [situations.example(row, method, settings) for row in train]

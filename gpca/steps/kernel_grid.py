@@ -9,7 +9,6 @@ from gpca.attribution.diagnostics import calibration_error, negative_log_likelih
 from gpca.attribution.predictions import prediction_frame
 from gpca.classifier.scores import Attribution
 from gpca.classifier.settings import Draws, GPCSettings, Kernel, LearningRate
-from gpca.errors import InputError
 from gpca.io.csv_file import write_csv
 from gpca.io.frame import Frame
 from gpca.jobs.job import Job
@@ -64,8 +63,6 @@ def evaluate_grid(registrations: Registrations, grid: KernelGrid, source: str, s
     from gpca.classifier.gpc import GPC
 
     train, test = registrations.rows("train"), registrations.rows("test")
-    if not len(train) or not len(test):
-        raise InputError(f"registrations of {source}, seed {seed}", "lack a split", "give training and test samples")
     h_S_d, concept_S = registrations.embedding, registrations.concept
     target_N = np.array([CONCEPTS.index(concept) for concept in concept_S[test]])
     tested, predictions, rows = registrations.subset(test), [], []

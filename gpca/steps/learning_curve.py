@@ -93,8 +93,6 @@ def learn_from_more(job: Job) -> None:
             causes = Causes.load(path)
             registrations = with_what_it_reads(labeled(causes), DESCRIBED, descriptors)
             sets[registrations.axes or axes] = causes, registrations
-        if axes not in sets:
-            raise InputError("causes", f"are none of {job.source}, seed {job.seed}", "give its own file too")
         causes, registrations = sets[axes]
         test = causes.rows("test")
         parts = [LabeledSamples.of(every.subset(training_rows(every, job.causes[0]))) for _, every in sets.values()]

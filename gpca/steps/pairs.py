@@ -126,11 +126,8 @@ def reduce(job: Job) -> None:
         with record_provenance([out], [embeddings], job.settings, seed=seed):
             arrays = load_arrays(embeddings, EMBEDDING_SHAPES, EMBEDDING_KINDS, (job.source, seed))
             h_S_d = arrays["h"]
-            train_S = arrays["split"] == "train"
-            if not train_S.any():
-                raise InputError(embeddings, "has no training samples", REGENERATE)
             axes = (job.source, seed, "reduction")
-            reduced_S_c = reduce(job.reduction, h_S_d[train_S], h_S_d, job.settings, *axes)
+            reduced_S_c = reduce(job.reduction, h_S_d[arrays["split"] == "train"], h_S_d, job.settings, *axes)
             save_arrays(out, {name: arrays[name] for name in EMBEDDING_SHAPES} | {"h": reduced_S_c}, (job.source, seed))
 
 

@@ -66,8 +66,6 @@ def try_methods(
 ) -> dict[str, Frame]:
     """Return for each method a row per pair and start, with the points that it had; see :func:`try_each`."""
     rows = np.flatnonzero((registrations.split == "test") & (registrations.sample < settings.samples)).tolist()
-    if not rows:  # threes of one object, which go round the objects
-        raise InputError(f"registrations of {source}", "have no test samples", "raise registrations.test")
     of_objects = Judges(objects, f"objects of {source}")
     judges = {row: of_objects.of(registrations, row) for row in rows}
     given = lru_cache(maxsize=4)(lambda *of: pair_to_register(registrations, of[0], source, seed, *of[1:]))

@@ -18,7 +18,6 @@ from gpca.comparison.joint_reading import (
     values_of,
 )
 from gpca.comparison.published import Number, read_published
-from gpca.errors import InputError
 from gpca.experiments.joint_reading import names
 
 from .made_up import ACCURACY, TOLERANCES, tidy
@@ -83,11 +82,7 @@ def test_by_chance_other_numbers_of_the_same_unit_come_into_a_place(rows):
     assert set(found.by_chance["column"]) == {1.0}  # it stands in another column
 
 
-def test_values_are_means_over_the_seeds_and_a_missing_one_is_refused(rows):
-    with pytest.raises(InputError, match="has no value of I / YCB / GP-CA"):
-        search([SHAP], [SHAP], rows[rows["method"] == "bald"], GRID, TOLERANCES, deals=1)
-    with pytest.raises(InputError, match="under knobs/weaker/low"):
-        search([SHAP], [SHAP], rows[rows["table"] != "knobs/weaker/low"], GRID, TOLERANCES, deals=1)
+def test_values_are_means_over_the_seeds(rows):
     more = pd.concat([rows, rows.assign(seed=1, value=rows["value"] * 1.1)])
     assert values_of(SHAP, more)["knobs/protocol/middle"] == (pytest.approx(52.5), False)
     assert values_of(LABELS, rows)["labels/weaker/only/only/only/only/only/0.02"] == (20, True)
