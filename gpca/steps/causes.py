@@ -129,17 +129,17 @@ def model(job: Job) -> None:
         registrations = Registrations.load(job.registrations, axes)
         h_S_d, train = read_embedding(job.embeddings, registrations)["embedding"], registrations.rows("train")
         gpc = GPC(CONCEPTS, GPCSettings(**job.section("gpc")), *axes)
+        policy = RecoveryPolicy()
+        if recovery:
+            thresholds, treatments, budget = recovery["thresholds"], recovery["treatments"], recovery["loop"]["budget"]
+            policy = RecoveryPolicy.of_settings(thresholds, treatments, budget, bald_N)
         Model(
             diagnoser=diagnoser,
             encoder=TrainedEncoder.of(load_model(job.encoder, settings, axes=axes).encoder, settings),
             gpc=gpc.fit(h_S_d[train], registrations.concept[train]),
             icp=ICPSettings(**icp),
             cloud_points=job.section("registrations").get("cloud_points", 2048),
-            policy=RecoveryPolicy.of_settings(
-                recovery["thresholds"], recovery["treatments"], recovery["loop"]["budget"], bald_N
-            )
-            if recovery
-            else RecoveryPolicy(),
+            policy=policy,
             title=job.title,
             stand_in=job.get("stand_in"),
             learned_from=tuple(job.get("learned_from", ())),

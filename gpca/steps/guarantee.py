@@ -13,13 +13,12 @@ import numpy as np
 from gpca.attribution.predictions import read_predictions
 from gpca.causes.dataset import LABELS, Causes, labeled, observed_only
 from gpca.causes.truth import BORDERLINE
-from gpca.errors import InputError
 from gpca.explainers.interface import EMBEDDINGS, REENACTED, answer_of
 from gpca.explainers.registry import CAUSES, explainer_entry
 from gpca.frames.source import REAL_WORLD
 from gpca.guarantee.answers import SCORES, Scored
 from gpca.guarantee.guarantee import states_of
-from gpca.io.container import REGENERATE_BOTH, require_same_samples
+from gpca.io.container import require_same_samples
 from gpca.io.csv_file import ANY, read_csv
 from gpca.io.files import Axes
 from gpca.io.frame import Frame
@@ -116,8 +115,6 @@ def scored_as_is(samples: Scored, prediction_files: Sequence[Path]) -> Iterator[
         seed = seed_of_file(path)
         own = samples.subset((samples.source == path.parts[-3]) & (samples.seed == seed))
         predicted, keys = _predicted(read_predictions(path)), own.sample.tolist()
-        if missing := [key for key in keys if key not in predicted]:
-            raise InputError(path, "lacks the {} sample {}".format(*missing[0].split()), "regenerate it")
         scores_n_4 = np.array([predicted[key] for key in keys]).reshape(-1, len(LABELS))
         seen_n = np.array([key.startswith("train") for key in keys])
         yield replace(own, model=np.full(len(own), f"seed {seed}"), seen=seen_n, scores=scores_n_4)
@@ -136,8 +133,6 @@ def scored_on_frames(frames: Sequence[tuple[Path, Path, Path]], name: str, as_is
         _, seed = axes_of(causes)
         numbers = registrations.sample.astype(str)
         require_same_samples(sample_file, samples, registrations.arrays, "causes of frames", ("sample",))
-        if predicted and set(predicted) != {f"test {number}" for number in numbers}:
-            raise InputError(prediction_file, "its samples differ from those of the causes of frames", REGENERATE_BOTH)
         rows = np.flatnonzero((state != BORDERLINE) & (samples["truth"] != BY_ICP).to_numpy())
         if not (predicted and as_is and len(rows)):
             continue
