@@ -11,8 +11,7 @@ import yaml
 from gpca.errors import InputError
 from gpca.frames.dataset import Dataset, read_models
 from gpca.frames.initial_pose import InitialPoseSettings, read_bop_results
-from gpca.frames.instances import points_on_model, read_instances
-from gpca.frames.plausibility import FARTHEST
+from gpca.frames.instances import FARTHEST, points_on_model, read_instances
 from gpca.io.csv_file import read_csv
 from gpca.objects.bop import read_models_info
 from gpca.objects.canonical import (

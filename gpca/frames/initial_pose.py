@@ -28,7 +28,6 @@ REMEDY = "export it again"
 # Limits of the distance from the camera, relative to that of the objects annotated in the image, for any one pose and
 # for half of the poses of a file. Poses in centimeters would be off by 10.
 ONE_OFF, HALF_OFF = 100.0, 3.0
-UNIT_OFF = 0.3  # largest distance of log10 of a ratio from a whole number that identifies a unit
 
 PosesByObject = Mapping[tuple[int, int, int], list[np.ndarray]]
 ERROR_COLUMNS = ("obj_id", "rx", "ry", "rz", "tx", "ty", "tz")
@@ -75,13 +74,9 @@ def read_bop_results(
 
 
 def _require_unit(subject: object, ratio: float, most: float) -> None:
-    if 1 / most <= ratio <= most:
-        return
-    tenfold = float(np.log10(max(ratio, 1e-9)))
-    nearest = round(tenfold) if abs(tenfold - round(tenfold)) < UNIT_OFF else 0
-    unit = {-3: "in meters", -1: "in centimeters", 3: "in micrometers"}.get(nearest, "in another unit")
-    fault = f"t is {ratio:.2g} times as long as that of the objects annotated in the image"
-    raise InputError(subject, fault, f"is t {unit}? the format requires millimeters")
+    if not 1 / most <= ratio <= most:
+        fault = f"t is {ratio:.2g} times as long as that of the objects annotated in the image"
+        raise InputError(subject, fault, "give it in millimeters")
 
 
 def estimates_of(

@@ -220,7 +220,7 @@ def scaled(factor, only=slice(None)):
 
 
 ROWS = {
-    "t in metres": (scaled(1e-3), "is t in meters? the format requires millimeters"),
+    "t in metres": (scaled(1e-3), "give it in millimeters"),
     "one t in metres": (scaled(1e-3, slice(3, 4)), "line 5: t is"),
     "t of zeros": (one(5, "0 0 0"), "line 4: t has z = 0 mm, not in front of the camera"),
     "t behind": (scaled(-1), "line 2: t has z = -"),
