@@ -34,13 +34,10 @@ def fetch(url: str, sha256: str | None, folder: str | Path, location: str | None
         try:
             download = pooch.HTTPDownloader(progressbar=True, chunk_size=1 << 16, timeout=TIMEOUT_S)
             download(url, str(partial_path), None)
-        except exceptions.HTTPError as fault:
-            answer = str(fault) if fault.response is None else f"{fault.response.status_code} {fault.response.reason}"
-            raise InputError(url, f"cannot be fetched: the server answered {answer}", remedy) from fault
-        except (exceptions.ConnectionError, exceptions.Timeout) as fault:
-            raise InputError(url, "cannot be reached", remedy) from fault
         except exceptions.RequestException as fault:
-            raise InputError(url, f"the transfer was interrupted ({type(fault).__name__})", remedy) from fault
+            answer = fault.response
+            words = f"the server answered {answer.status_code} {answer.reason}" if answer is not None else repr(fault)
+            raise InputError(url, f"cannot be fetched: {words}", remedy) from fault
         again = "the download was removed; try again, or correct sha256 in the config"
         actual = _check(partial_path, sha256, url, again)
     if sha256 is None:
