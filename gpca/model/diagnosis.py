@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from typing import Any, Self
 
 import numpy as np
@@ -35,6 +35,7 @@ TAKE = "take"  # action where a repaired pose takes the place of the registered 
 RESCALE = "rescale"  # action where source and target differ in scale
 REFINE = "refine"  # action for a given pose from which a registration would succeed
 SURE = 0.5  # probability of a pose from which to rerun from it
+LENGTHS = ("apart", "shift", "error", "noise", "noise_floor", "tolerance", "expected_error", "differs_by")  # fields
 ADVICE = {  # per branch of the policy
     NOTHING: "none",
     "reinitialize": "reinitialize ICP with a broader search",
@@ -53,6 +54,23 @@ def plain(items: Sequence[tuple[str, Any]]) -> dict[str, Any]:
     """Return the fields of a dataclass for JSON: arrays and tuples as lists."""
     values = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in items}
     return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
+
+
+def outside(part: Any, frame: CanonicalFrame, T_target_source_init: np.ndarray) -> Any:
+    """Convert what a dataclass, and those in it, have in a canonical frame to that of the initial pose and its unit."""
+    if isinstance(part, tuple):
+        return tuple(outside(each, frame, T_target_source_init) for each in part)
+    if isinstance(part, Undetermined):
+        return part.outside(frame)
+    if not is_dataclass(part) or isinstance(part, type):
+        return part
+    values = {each.name: outside(getattr(part, each.name), frame, T_target_source_init) for each in fields(part)}
+    values |= {name: frame.diameter * values[name] for name in LENGTHS if name in values}
+    if isinstance(part, FittingPose):
+        values["T_target_source"] = frame.pose_outside(part.T_target_source) @ T_target_source_init
+    if isinstance(part, Reenacted):
+        values["effects"] = {cause: effect * frame.diameter for cause, effect in part.effects.items()}
+    return replace(part, **values)
 
 
 @dataclass(frozen=True)
@@ -154,11 +172,6 @@ class FittingPose:
             **more,
         )
 
-    def outside(self, frame: CanonicalFrame, T_target_source_init: np.ndarray) -> Self:
-        """Convert to the user's frame and unit of length, in which the initial pose is given."""
-        T = frame.pose_outside(self.T_target_source) @ T_target_source_init
-        return replace(self, T_target_source=T, **in_unit_of(frame, self, "apart", "shift", "error"))
-
     def words(self, unit: str, fits: str) -> str:
         """Describe the pose relative to the result, after the verb `fits`."""
         if self.registered:
@@ -169,13 +182,9 @@ class FittingPose:
         return f"{fits} {turn}, {in_decimals(self.shift)} {unit} away"
 
 
-def in_unit_of(frame: CanonicalFrame, values: Any, *names: str) -> dict[str, Any]:
-    return {name: getattr(values, name) * frame.diameter for name in names}
-
-
 @dataclass(frozen=True)
 class Reenacted:
-    """Counterfactuals under hypotheses of the true pose, in diameters and the canonical frame until `outside`."""
+    """Counterfactuals under hypotheses of the true pose, in diameters and the canonical frame until :func:`outside`."""
 
     error: float  # v̂ with all causes, the mean over the hypotheses
     effects: dict[str, float]  # φ̂, the contribution of each cause to that error
@@ -223,15 +232,6 @@ class Reenacted:
         """The likeliest pose, if it is more likely than all others together and not the registration's result."""
         first = self.poses[0]
         return None if first.registered or first.probability < SURE else first
-
-    def outside(self, frame: CanonicalFrame, T_target_source_init: np.ndarray) -> Reenacted:
-        """Convert to the user's frame and unit of length, in which the initial pose is given."""
-        effects = {cause: effect * frame.diameter for cause, effect in self.effects.items()}
-        poses = tuple(pose.outside(frame, T_target_source_init) for pose in self.poses)
-        undetermined = self.undetermined and self.undetermined.outside(frame)
-        scale = self.scale and replace(self.scale, **in_unit_of(frame, self.scale, "error"))
-        parts: dict[str, Any] = {"effects": effects, "poses": poses, "undetermined": undetermined, "scale": scale}
-        return replace(self, **parts, **in_unit_of(frame, self, "error", "noise", "noise_floor"))
 
     def as_dict(self) -> dict[str, object]:
         """Values for JSON."""
@@ -340,11 +340,6 @@ class Diagnosis:
             return ("pose",)
         first, *rest = sorted(self.causes, key=lambda cause: -self.causes[cause])
         return first, *(cause for cause in rest if self.causes[cause] >= LIKELY)
-
-    def outside(self, frame: CanonicalFrame, T_target_source_init: np.ndarray) -> Diagnosis:
-        """Convert from the target's canonical frame to the user's frame and unit of length."""
-        reenacted = self.reenacted.outside(frame, T_target_source_init)
-        return replace(self, **in_unit_of(frame, self, "tolerance", "expected_error"), reenacted=reenacted)
 
     def as_dict(self) -> dict[str, object]:
         """Values for JSON."""

@@ -20,7 +20,7 @@ from gpca.classifier.scores import entropy
 from gpca.errors import InputError
 from gpca.model.clouds import Clouds, voids_of
 from gpca.model.diagnoser import QUICK_HYPOTHESES, QUICK_POINTS
-from gpca.model.diagnosis import CHECK, REFINE, RERUN, RESCALE, TAKE, Diagnosis
+from gpca.model.diagnosis import CHECK, REFINE, RERUN, RESCALE, TAKE, Diagnosis, outside
 from gpca.model.explanation import GIVEN, Explanation, Motion, PoseSpread
 from gpca.model.file import Model
 from gpca.model.location import model_path
@@ -92,7 +92,7 @@ class Explainer:
         with _timed(seconds, "diagnosis"):
             aligned = clouds.source, clouds.target, T_found
             diagnosis, enactments = diagnoser.diagnose(*aligned, register, limit / clouds.frame.diameter)
-        diagnosis = replace(diagnosis.outside(clouds.frame, clouds.T_target_source_init), void=bool(voids))
+        diagnosis = replace(outside(diagnosis, clouds.frame, clouds.T_target_source_init), void=bool(voids))
         notes += [FAST] if fast else []
         with _timed(seconds, "embedding"):
             h_1_d = self.embed(transform(T_found, clouds.source))

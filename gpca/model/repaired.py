@@ -15,7 +15,7 @@ from gpca.causes.settings import OBSERVED
 from gpca.guarantee.acceptance import WRONG
 from gpca.model import page, repair
 from gpca.model.clouds import FEWEST_MATCHES, Clouds, voids_of
-from gpca.model.diagnosis import CHECK, TAKE, UNKNOWN, FittingPose
+from gpca.model.diagnosis import CHECK, TAKE, UNKNOWN, FittingPose, outside
 from gpca.model.explanation import GIVEN, UNKNOWN_STATUS, ExplainedRegistration, PoseSpread
 from gpca.model.file import Model
 from gpca.model.repair import GOOD, NOT_REPAIRED, REPAIRED, SEVERAL, Part, Proposals, Verdict
@@ -23,7 +23,6 @@ from gpca.model.result import calibrated_at
 from gpca.model.scene import Scene
 from gpca.model.undetermined import Undetermined, undetermined_at
 from gpca.numerals import in_decimals
-from gpca.objects.canonical import CanonicalFrame
 from gpca.reenactment.dataset import described
 from gpca.reenactment.enactment import Enactment
 from gpca.reenactment.hypotheses import weights_of
@@ -54,11 +53,6 @@ class OtherPose(FittingPose):
     off: float  # probability that it is off by more than the tolerance
     differs: Part | None  # the part of the target that tells it from the first of these poses; None of the first
     differs_by: float  # mean distance over that part
-
-    def outside(self, frame: CanonicalFrame, T_target_source_init: np.ndarray) -> Self:
-        """Convert to the user's frame and unit of length, in which the initial pose is given."""
-        converted = super().outside(frame, T_target_source_init)
-        return replace(converted, differs_by=frame.diameter * self.differs_by)
 
     def line(self, number: int, unit: str) -> str:
         """One line of text."""
@@ -150,7 +144,7 @@ class Repair(ExplainedRegistration):
         described_F = None if method == GIVEN else described(pair, diagnoser.runs.icp)
         verdict = repair.decide(diagnoser.judge, level, proposals, tolerance, lost, described_F)
         errors_n = diagnoser.judge.error(proposals.evidence)
-        poses = [pose.outside(frame, T_init) for pose in other_poses(proposals, verdict, errors_n, surface)]
+        poses = [outside(pose, frame, T_init) for pose in other_poses(proposals, verdict, errors_n, surface)]
         T_best = proposals.T_n[verdict.row or 1]
         if verdict.name != GOOD:
             outliers, missing = repair.unseen(clouds.source, surface, T_best)

@@ -17,7 +17,7 @@ from gpca.alignment.pose_error import displacements
 from gpca.causes.policy import NOTHING, TREATMENTS
 from gpca.causes.truth import FAILED, NOMINAL
 from gpca.errors import InputError
-from gpca.model.diagnosis import CHECK, RERUN, RESCALE, Reenacted
+from gpca.model.diagnosis import CHECK, RERUN, RESCALE, Reenacted, outside
 from gpca.model.explanation import GIVEN, NOT_SURE, Evidence, Motion, PoseSpread, ScanExplanation
 from gpca.model.scan_registration import TRUTH, PossiblePose, Scans, in_voxels, voxel_size
 from gpca.model.scene import Scene
@@ -72,7 +72,7 @@ def explain_scans(
     T_found, tolerance = outcome.T_target_source, limit / frame.diameter
     ranked = scans.poses(T_found, min(scans.voxel, tolerance / 2))
     enactments = [scans.enacted(pose, T_found) for pose in ranked]
-    reenacted = _reenacted(scans, enactments, T_found).outside(frame, T_init)
+    reenacted = outside(_reenacted(scans, enactments, T_found), frame, T_init)
     evidence, overlap = evidence_at(scans, ranked, T_found, tolerance), scans.overlap(T_found)
     failure = failure_of(evidence)
     state = state_of(failure, overlap[0])

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gpca.model.diagnosis import CHECK, UNKNOWN
+from gpca.model.diagnosis import CHECK, UNKNOWN, outside
 from gpca.model.explanation import LEARNED
 from gpca.model.repair import verdict_of
 from gpca.model.repaired import OtherPose, Repair
@@ -51,7 +51,7 @@ def repair_scans(
     for (pose, weight), failed in zip(others, failure_n[1:], strict=True):
         expected = float((weight_k * weights_and_errors(scans, ranked, pose)[1]).sum())
         more = {"off": float(failed), "differs": None, "differs_by": 0.0}
-        poses.append(OtherPose.of(pose, weight, expected, T, scans.coarse, **more).outside(frame, T_init))
+        poses.append(outside(OtherPose.of(pose, weight, expected, T, scans.coarse, **more), frame, T_init))
     at_pose, T_registered = scans.outcome(T_n[verdict.row]), frame.pose_outside(T) @ T_init
     repair = Repair(
         T_target_source=T_registered,

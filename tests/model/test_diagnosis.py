@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gpca.causes.truth import ALL, shapley_values
-from gpca.model.diagnosis import Reenacted, axis_in_words
+from gpca.model.diagnosis import Reenacted, axis_in_words, outside
 from gpca.objects.canonical import CanonicalFrame
 from gpca.reenactment.enactment import Enactment
 from gpca.reenactment.hypotheses import Hypothesis
@@ -57,7 +57,7 @@ def test_poses_are_named_by_where_they_lie_from_the_result(drill):
     assert [round(pose.turn_deg) for pose in found.poses] == [0, 90, 0, 52]
     assert found.poses[3].shift == pytest.approx(0.05)
     assert sum(pose.probability for pose in found.poses) == pytest.approx(1)
-    lines = found.outside(CanonicalFrame(np.zeros(3), 200.0), np.eye(4)).lines("mm")[2:]
+    lines = outside(found, CanonicalFrame(np.zeros(3), 200.0), np.eye(4)).lines("mm")[2:]
     assert lines[0].startswith("pose 1    the object fits as registered, within ")
     assert lines[0].endswith(" mm: probability 0.40")
     assert lines[1].startswith("pose 2    the object also fits turned by 90° about the target's z axis, ")
@@ -87,25 +87,25 @@ def test_effects_add_up_and_lengths_are_in_the_users_unit(drill):
     np.testing.assert_allclose(list(found.effects.values()), shapley_values(ERRORS[None])[0])
     assert sum(found.effects.values()) == pytest.approx(ERRORS[ALL] - ERRORS[0])
     assert (found.noise, found.outliers, found.missing) == (0.02, 0.25, 0.5)
-    outside = found.outside(CanonicalFrame(np.array([1.0, 2.0, 3.0]), 10.0), np.eye(4))
-    assert outside.error == pytest.approx(0.7)
-    assert outside.noise == pytest.approx(0.2)
-    assert outside.effects["pose"] == pytest.approx(10 * found.effects["pose"])
-    first, second = outside.lines("mm")[:2]
+    converted = outside(found, CanonicalFrame(np.array([1.0, 2.0, 3.0]), 10.0), np.eye(4))
+    assert converted.error == pytest.approx(0.7)
+    assert converted.noise == pytest.approx(0.2)
+    assert converted.effects["pose"] == pytest.approx(10 * found.effects["pose"])
+    first, second = converted.lines("mm")[:2]
     assert first == "effects   on the re-enacted error of 0.7 mm: noise 0.1, pose 0.2, overlap 0.4"
     assert second == "observed  noise 0.2 mm, 25% outliers, 50% of the surface missing"
-    assert replace(outside, noise=0.04).lines("mm")[1].startswith("observed  noise below 0.04 mm, ")
+    assert replace(converted, noise=0.04).lines("mm")[1].startswith("observed  noise below 0.04 mm, ")
 
 
 def test_a_pose_takes_the_users_source_to_the_users_target(drill):
     frame = CanonicalFrame(np.array([1.0, 2.0, 3.0]), 10.0)
     T_init = exp(np.array([[0.1, 0.2, 0.3, 5.0, 6.0, 7.0]]))[0]
     T = moved((0, 90, 0))
-    outside = said(drill, T).outside(frame, T_init)
+    converted = outside(said(drill, T), frame, T_init)
     source = np.random.default_rng(1).normal(size=(5, 3))
     expected = transform(T, frame.coordinates(transform(T_init, source)))
-    np.testing.assert_allclose(frame.coordinates(transform(outside.poses[0].T_target_source, source)), expected)
-    plain = json.loads(json.dumps(outside.as_dict()))
+    np.testing.assert_allclose(frame.coordinates(transform(converted.poses[0].T_target_source, source)), expected)
+    plain = json.loads(json.dumps(converted.as_dict()))
     assert np.array(plain["poses"][0]["T_target_source"]).shape == (4, 4)
     assert set(plain) == {
         "error",
