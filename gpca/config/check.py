@@ -26,11 +26,10 @@ LARGEST_BYTES = 2**36  # a thousand times what five seeds of the paper's protoco
 
 
 def read(config: dict, command_line: Mapping, as_module: bool = False) -> tuple[dict, dict[str, dict]]:
-    """Read the config of a run as Snakemake merged it; InputError as in :func:`check`.
+    """Return the config of a run in the order of the defaults, without what it leaves out, and :func:`check`'s sources.
 
     `command_line` has the values given with ``--config``, whose numbers are still text. A config that another workflow
-    gives to this one as a module lacks the defaults. Returned are the config in the order of the defaults, without what
-    it leaves out, with the limit of success in all sections, and the sources that :func:`check` returns.
+    gives to this one as a module lacks the defaults.
     """
     whole = layers.in_order(layers.with_types(layers.with_defaults(config) if as_module else config, command_line))
     sources = check(whole)

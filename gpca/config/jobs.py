@@ -28,10 +28,8 @@ _locks: list[IO[str]] = []  # held until this process ends
 def export_to_jobs(config: Mapping, source_folder: str | Path = ROOT) -> None:
     """Set environment variables so that jobs run this Python and this code, whatever the working directory.
 
-    PATH begins with this Python's folder, as jobs call ``python``. PYTHONPATH begins with `source_folder`, which holds
-    ``gpca`` and ``baselines``, unless Python looks there anyway, and PYTHONSAFEPATH ignores a ``gpca`` in the working
-    directory. Provenance records the hashes of the config's sections that results depend on. Libraries are limited to
-    the common instructions (:mod:`gpca.process.processor`).
+    PATH begins with this Python's folder, PYTHONPATH with `source_folder` unless Python looks there anyway. Provenance
+    records the hashes of the config's sections; libraries are limited to the common instructions.
     """
     sections = {name: sha256_of_settings(value) for name, value in config.items() if name not in WITHOUT_RESULT}
     os.environ[CONFIG_VARIABLE] = json.dumps(sections, sort_keys=True)
@@ -50,11 +48,7 @@ def clear_leftovers(temporary: Sequence[str | Path], main: bool = True, folder: 
     """Lock the working directory, and clear the leftovers of killed Snakemakes if no other one is running.
 
     All running Snakemakes share a lock of ``running`` in Snakemake's `folder`; one that gets it exclusively is alone.
-    Nothing is done on a file system without such locks.
-
-    Args:
-        temporary: folders that this Snakemake has made elsewhere, and removes unless it is killed.
-        main: whether it runs the workflow; one that was started for a job, as on a cluster, clears nothing.
+    One that is not `main` was started for a job, and clears nothing. `temporary` are folders that it made elsewhere.
     """
     own_folders, folder = [Path(path).absolute() for path in temporary], Path(folder)
     try:

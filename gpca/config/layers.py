@@ -85,10 +85,9 @@ def in_order(config: Mapping[str, Any], lower: Mapping[str, Any] | None = None) 
 
 
 def with_types(config: Mapping[str, Any], command_line: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the config with the command line's values read as in a config file: numbers, booleans, null.
+    """Return the config with the command line's values, as far as it has them, read as in a config file.
 
-    Snakemake reads values inside lists and mappings as text. Only those values of the command line that the config
-    still has are converted: a workflow that uses this one as a module may have another config.
+    Snakemake reads values inside lists and mappings as text.
     """
     return {
         name: _typed(value, command_line[name]) if name in command_line else value for name, value in config.items()
@@ -109,8 +108,7 @@ def _typed(value: Any, given: Any) -> Any:
 def without_false(config: Mapping[str, Any]) -> dict[str, Any]:
     """Return the config without the entries left out and the rows that need them; `config` is not changed.
 
-    A row is an entry of a list, an explainer or a policy. Keys that name one thing that is left out, such as
-    `figures.source`, and lists of nothing else stay: :func:`gpca.config.check.check` refuses them.
+    Keys that name one thing that is left out, such as `figures.source`, and lists of nothing else stay, to be refused.
     """
     left_out = {key: names_left_out(config, key) for key in OPTIONAL}
     whole = dict(config)

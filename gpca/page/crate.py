@@ -38,11 +38,7 @@ def write_crate(folder: str | Path, run: str, sources: Iterable[str], seeds: Seq
 
 
 def read_jobs(folder: Path) -> list[dict[str, Any]]:
-    """Return the records of a run's jobs, each once with all its ``outputs``.
-
-    Paths of outputs, and of inputs in the run's folder, are relative to it. The job that writes the crate is left out,
-    as its record is that of an earlier crate.
-    """
+    """Return the records of a run's jobs but the one that writes the crate, each once with all its ``outputs``."""
 
     def relative(path: Path) -> str:
         return path.relative_to(folder).as_posix() if path.is_relative_to(folder) else str(path)

@@ -68,11 +68,7 @@ class FinishedRun:
 
 
 def write_page(folder: str | Path, run: FinishedRun) -> None:
-    """Write ``index.html`` of a finished run into its folder ``results/{run}``.
-
-    The page needs only the tables and figures beside it. It shows comparison and findings if the folder has the
-    collected files, such as ``comparison.csv``.
-    """
+    """Write ``index.html`` of a finished run into its folder ``results/{run}``."""
     folder = Path(folder)
     sample_files = [Path(path) for files in run.causes.values() for path in files.values()]
     needed = [f"{each.kind}/{each.name}.{suffix}" for each in run.results for suffix in SUFFIXES[each.kind]]
@@ -176,10 +172,7 @@ def _content(folder: Path, result: Shown, run: FinishedRun, links: Links) -> dic
 
 
 def in_groups(printed: Mapping) -> dict:
-    """Group consecutive rows of a printed table with the same first label, such as the dataset, as its ``title``.
-
-    All rows form one group without a title where groups would be small, labels come back later, or there is one label.
-    """
+    """Group consecutive rows with the same first label; all in one where groups would be small or labels come back."""
     rows, labels = printed["rows"], printed["label_columns"]
     runs = [(first, list(group)) for first, group in groupby(rows, key=lambda row: row[0][0])]
     if labels < 2 or len({first for first, _ in runs}) < len(runs) or len(rows) < FEWEST * len(runs):
@@ -213,10 +206,7 @@ class Links:
         self._results = {name for name in results if "_" in name}  # the others are ordinary words too
 
     def in_text(self, text: str, without: str = ""):
-        """Return a text as HTML: escaped, with backticks as code, and with links.
-
-        `without` names the table or figure that the text belongs to, which is not linked.
-        """
+        """Return a text as HTML: escaped, with backticks as code, and with links, but to the table `without`."""
         from markupsafe import Markup, escape
 
         parts = str(escape(text)).split("`")

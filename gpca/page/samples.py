@@ -36,10 +36,9 @@ def first_of_each_cause(causes: Causes) -> list[int]:
 
 
 def cause_samples(files: Mapping[str, str | Path], source: Mapping, settings: CauseSettings) -> list[dict]:
-    """Return the samples of one source by `RULE`, as JSON values for the page's 3-D view.
+    """Return the samples of one source by `RULE`, as JSON values for the page's 3-D view; lengths in % of the diameter.
 
-    In % of the diameter are the shown error, the limit of failures, the share φ of each concept, and the mean error
-    without each subset of the causes. `files` are ``objects`` of the source, and ``causes`` of its first seed.
+    `files` are ``objects`` of the source, and ``causes`` of its first seed.
     """
     causes = Causes.load(files["causes"])
     rows = first_of_each_cause(causes)

@@ -145,7 +145,6 @@ _TRACKS = (
         predictions="scan_diagnoses/seed{seed}.csv",
         labeled_by=("scans", "learned", "explainer"),
         read=("scan_descriptors/{source}/seed{seed}.npz", "scan_reenactments/{source}/seed{seed}.npz"),
-        training_folders=TRAINING_FOLDERS,
         learn_from=(SCANS, OBJECTS),
         without_training="learn from the samples of other scenes, which registrations.cluster names",
         groups="Scans",
