@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from gpca.comparison import claims_table
+from gpca.comparison.claims import claims as table_of_claims
 from gpca.comparison.claims import read_verdicts
 from gpca.declarations.experiment import Experiment
 from gpca.declarations.plan import Run
@@ -38,4 +38,4 @@ def claims(run: Run, verdicts):
     config = run.config
     called = policy_titles(config) | learner_titles(config) | titles(config["active_learning"]["strategies"])
     called |= run.titles(explainer_entry, config["explainers"])
-    return claims_table.claims(verdicts, compared_sources(run), called)
+    return table_of_claims(verdicts, compared_sources(run), called)

@@ -1,8 +1,7 @@
 import pandas as pd
 import pytest
 
-from gpca.comparison.claims import CLAIM_COLUMNS
-from gpca.comparison.claims_table import claims
+from gpca.comparison.claims import CLAIM_COLUMNS, claims
 from gpca.errors import InputError
 
 OF_CLAIM = {"claim": "best", "sentence": "Ours is best.", "place": "Sec. IV", "test": "greater", "unit": "%",

@@ -4,8 +4,7 @@ import pandas as pd
 import pytest
 import yaml
 
-from gpca.comparison.claims import read_verdicts
-from gpca.comparison.claims_table import counted
+from gpca.comparison.claims import counted, read_verdicts
 from gpca.comparison.markdown import counts_table, summary
 from gpca.comparison.published import NONE_YET, read_published, read_reasons
 from gpca.comparison.readings import READINGS, judge_readings, with_readings
