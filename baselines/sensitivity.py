@@ -69,7 +69,6 @@ def single_drops(worth_N_8: np.ndarray) -> np.ndarray:
 
 
 def _single_remedies(errors_N_8: np.ndarray) -> np.ndarray:
-    """Return the change that each remedy makes alone (N, 3)."""
     return single_drops(-errors_N_8[:, ::-1])
 
 

@@ -113,7 +113,6 @@ def measure_clean_pairs(
 def _clean_pair(
     subject: Subject, source: str, seed: int, number: int, settings: CauseSettings
 ) -> tuple[float, float] | None:
-    """Return error and uncertainty of a clean pair, None where it has none."""
     random = generator(source, seed, "causes", "clean", subject.name, number)
     first = draw_candidate(subject.surface, np.zeros(len(CONCEPTS), bool), settings, random)
     second = redrawn(first, subject.surface, random)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -144,7 +144,6 @@ def read_pose_errors(path: Path, listed: Collection[int]) -> list[tuple[int, np.
 
 
 Form = Literal["results", "true_pose", "global_registration"]
-FORMS = get_args(Form)
 
 
 @dataclass(frozen=True)
@@ -156,10 +155,6 @@ class InitialPoseSettings:
     translation: Shift = 0.03  # the same, in diameters
     voxel: PositiveShare = 0.05  # of the features of `global_registration`, in diameters
     tries: Count = 20  # random starts of RANSAC, of which the best is taken
-
-    def __post_init__(self) -> None:
-        if self.form not in FORMS:
-            raise InputError(f"initial pose '{self.form}'", "unknown", f"choose one of {', '.join(FORMS)}")
 
 
 def displace(T_camera_object: np.ndarray, diameter_m: float, settings: InitialPoseSettings, random) -> np.ndarray:

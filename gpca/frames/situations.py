@@ -176,7 +176,6 @@ class Situations:
         return situation if whole and situation.visible().sum() >= LEAST_VISIBLE * whole else None
 
     def _silhouette(self, situation: Situation, object_: Placed) -> np.ndarray:
-        """Return the pixels of a thinned image that an object by itself would fill."""
         if object_.model not in self._alone:
             surface = self._shelf.surfaces[object_.model]
             self._alone[object_.model] = MeshScene([(surface.vertices_m, surface.triangles)])

@@ -76,7 +76,6 @@ def make_frame_registrations(
 def _register_one(
     instances: Instances, i: int, objects: ObjectClouds, concept: str, settings: FrameSettings, random
 ) -> tuple[dict, str]:
-    """Return the aligned pair of an instance, and what its points were lost to."""
     index = int(instances.object_index[i])
     diameter_m = float(objects.diameters_m[index])
     registration = settings.registration

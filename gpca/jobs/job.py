@@ -104,7 +104,6 @@ def files_by_name(files: Any) -> dict[str, Path | list[Path]]:
 
 
 def _print_to(logs: Any) -> None:
-    """Redirect stderr of the process and its libraries to the rule's log, if it has one."""
     if logs:
         os.dup2(os.open(logs[0], os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666), sys.stderr.fileno())
 

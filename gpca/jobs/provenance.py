@@ -107,6 +107,5 @@ def _code_version() -> dict[str, object]:
 
 
 def _git(*arguments: str) -> str | None:
-    """Return the output of git in the folder of the package, or None where it fails."""
     done = subprocess.run(["git", "-C", str(ROOT), *arguments], capture_output=True, text=True, check=False)
     return None if done.returncode else done.stdout.strip()

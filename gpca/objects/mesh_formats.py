@@ -304,7 +304,6 @@ def _read_stl(file: IO[bytes]) -> Shape:
 
 
 def _loose(corners: np.ndarray) -> Shape:
-    """Return triangles none of which share a vertex."""
     vertices = corners.reshape(-1, 3).astype(np.float64)
     return Shape(vertices, np.arange(len(vertices)).reshape(-1, 3))
 

@@ -17,8 +17,6 @@ VTK_CELLS = (b"VERTICES", b"LINES", b"POLYGONS", b"TRIANGLE_STRIPS")
 
 
 class _VTK:
-    """The lines and arrays of a legacy file, one after the other."""
-
     def __init__(self, file: IO[bytes]) -> None:
         self._file = file
         if not self.line().startswith(b"# vtk DataFile"):

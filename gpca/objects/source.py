@@ -101,7 +101,6 @@ def surfaces(entry: dict, cache_folder: str | Path) -> Iterator[Surface]:
 
 
 def _require_surface(surface: object, subject: str) -> None:
-    """Raise an InputError unless code from outside yielded a surface of plain numbers."""
     if not isinstance(surface, Surface) or not isinstance(surface.name, str):
         raise InputError(subject, f"yields a {type(surface).__name__}", "make it yield a named Surface")
     name, size = f"{subject}: object {surface.name!r}", (None, 3)

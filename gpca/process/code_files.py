@@ -51,7 +51,6 @@ _STATEMENTS = ("body", "orelse", "finalbody", "handlers", "cases")  # where a st
 
 @cache
 def _imports(module: str) -> tuple[str, tuple[str, ...]]:
-    """Return the file of a module, and the project modules that it imports."""
     module, _, function = module.partition(":")
     file = _file_of(module)
     key = hashlib.sha256(f"{_OWN_CODE} {file} {function}\n".encode() + file.read_bytes()).hexdigest()
@@ -125,7 +124,6 @@ def _used_and_bound(node: ast.AST) -> tuple[set[str], set[str]]:
 
 
 def _is_followed(name: str, importing: str) -> bool:
-    """Return whether an import from a module of the package `importing` counts."""
     first = name.split(".")[0]
     if first in PACKAGES or first == importing:
         return True

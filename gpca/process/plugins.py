@@ -76,7 +76,6 @@ def entries_outside(variable: str, kind: str, of: type, taken: Iterable[str]) ->
 
 
 def _modules(groups: Iterable[str]) -> dict[str, ModuleType]:
-    """Return the plugins of the config, and those that installed packages announce in some groups, by name."""
     modules = [load(name) for name in named()]
     for package, name in (announced for group in groups for announced in _announced(group)):
         modules.append(imported(name, f"plugin {name} of the package {package}"))
@@ -149,7 +148,6 @@ def lone_root(top: str) -> Path | None:
 
 @cache
 def _announced(group: str) -> tuple[tuple[str, str], ...]:
-    """Return (package, module) of the entry points of a group, by their names."""
     points = sorted(metadata.entry_points(group=group), key=lambda point: (point.name, point.value))
     return tuple((point.dist.name if point.dist else point.name, point.module) for point in points)
 
@@ -168,7 +166,6 @@ def imported(module: str, subject: str) -> ModuleType:
 
 
 def _remember(module: ModuleType) -> None:
-    """Note the folder that a module or its package is imported from."""
     file, parts = getattr(module, "__file__", None), module.__name__.split(".")
     if file is not None:
         path = Path(file).resolve()

@@ -89,7 +89,6 @@ def _flags() -> set[str]:
 
 
 def _cpuinfo() -> dict[str, str]:
-    """Return the fields of the first processor that Linux lists."""
     if not CPUINFO.exists():
         return {}
     first = CPUINFO.read_text(encoding="utf-8").split("\n\n", 1)[0]

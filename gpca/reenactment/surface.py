@@ -181,5 +181,4 @@ def _cut(model: np.ndarray, observed: np.ndarray, blur_M: np.ndarray) -> tuple[n
 
 
 def _beyond(count: int) -> int:
-    """Return how many of the observed points may lie beyond the plane."""
     return max(0, count - 1 - int(np.ceil((1 - max(BEYOND_SHARE, BEYOND / count)) * (count - 1))))

@@ -115,7 +115,6 @@ def npz_scenes(entry: ScanEntry, place: Path) -> Iterator[ScannedScene]:
 
 
 def _read_pairs(path: Path) -> dict[str, tuple[Known, ...]]:
-    """Return the pairs that a file lists, by scene, each once; none where there is no file."""
     if not path.is_file():
         return {}
     rows = read_csv(path, ("scene", "target", "source", "overlap"), ANY, "correct it as docs/real_world.md says")
@@ -224,7 +223,6 @@ def read_log(path: Path) -> dict[tuple[str, str], np.ndarray]:
 
 
 def _read_overlaps(path: Path) -> dict[tuple[str, str], float]:
-    """Return the overlap of each pair in a file; none where there is no file."""
     shares = {}
     for subject, words in _lines_of(path) if path.is_file() else ():
         with refusing(subject, "{}", BENCHMARK_REMEDY):

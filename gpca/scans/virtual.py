@@ -72,7 +72,6 @@ def compound(name: str, views: int) -> ScannedScene:
 def _scanned(
     name: str, kind: Kind, meshes: MeshScene, places: list[np.ndarray], camera: Camera, noise: DepthNoise
 ) -> ScannedScene:
-    """Return what a camera measures from each ``T_scene_camera``."""
     scans = {}
     for i, T_scene_camera in enumerate(places):
         depth_m = noise.measure(meshes.look(camera, T_scene_camera), generator("virtual scans", name, i))

@@ -100,7 +100,6 @@ def _rows(track: Track, run: Path, tested: Mapping[Part, Causes]) -> Rows:
 def _predictions(
     track: Track, run: Path, config: Mapping[str, Any], parts: Sequence[Part]
 ) -> dict[Key, dict[Part, Frame]]:
-    """Return the predictions of every method for test samples, by part."""
     predictions: dict[Key, dict[Part, Frame]] = {}
     for source, seed in parts:
         if not track.predictions:

@@ -96,7 +96,6 @@ def read_submission(path: Path, published: Published) -> Submission:
 
 
 def _read_rows(path: Path, lines: list[str], published: Published) -> tuple[np.ndarray, np.ndarray]:
-    """Return scores (N, C) and named labels (N,)."""
     track, rows = published.track, published.rows
     scores = [f"score_{label}" for label in track.labels]
     first = next((number for number, line in enumerate(lines) if not line.startswith("#")), len(lines))

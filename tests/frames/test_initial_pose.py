@@ -1,7 +1,6 @@
 """Results files that no estimator meant."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -52,11 +51,6 @@ def test_features_find_an_object_that_has_no_symmetry(tiny):
     ]
     assert min(errors) < 0.1
     assert np.array_equal(found[0], registration.register(instances.cloud_m(rows[0]), seed=1))
-
-
-def test_an_unknown_form_is_refused():
-    with pytest.raises(InputError, match="initial pose 'guess': unknown; choose one of results, true_pose"):
-        replace(InitialPoseSettings(), form="guess")
 
 
 ERRORS = "scene_id,im_id,obj_id,estimator,rx,ry,rz,tx,ty,tz"
