@@ -150,13 +150,9 @@ def add_ship_predictions_arguments(parser: ArgumentParser) -> None:
     add("--config", help="name of the run's config (default: that of the track)")
     add("--out", type=Path, default=FOLDER, help="folder to write them to")
     default_tracks = [name for name, track in TRACKS.items() if track.run == DEFAULT]
-    words = "; ".join(f"{name} needs the run {track.run}" for name, track in TRACKS.items() if track.run != DEFAULT)
-    add(
-        "--tracks",
-        nargs="+",
-        default=default_tracks,
-        help=f"tracks to extract (default: those of the default run; {words})",
-    )
+    others = "; ".join(f"{name} needs the run {track.run}" for name, track in TRACKS.items() if track.run != DEFAULT)
+    words = f"tracks to extract (default: those of the default run; {others})"
+    add("--tracks", nargs="+", default=default_tracks, help=words)
 
 
 def run_ship_predictions(options: Namespace) -> None:

@@ -98,14 +98,9 @@ def load(
 ) -> TrackData:
     """Return samples of a track, which are made from the repository's data where the cache lacks them.
 
-    Args:
-        track: ``causes``, ``hard``, ``frames`` or ``scans``.
-        source: such as ``ycb``; the first one by default.
-        split: ``train``, ``test`` or None for both. Depth frames and scans are all for testing.
-        samples: folder of the samples, by default the user's cache.
-        data_dir: folder of scans that the repository does not have.
-
-    An unknown name, and samples that cannot be made or are not the published ones, raise an InputError.
+    The track is ``causes``, ``hard``, ``frames`` or ``scans``, the source by default its first, the split ``train``,
+    ``test`` or None for both (depth frames and scans are all for testing), the folder of samples by default the user's
+    cache; `data_dir` has scans that the repository lacks. What is unknown or not as published raises an InputError.
     """
     folder, data = (Path(path) if path else None for path in (samples, data_dir))
     chosen = TrackSamples.of(track_of(track), folder, data_dir=data)

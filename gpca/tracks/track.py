@@ -19,7 +19,6 @@ from gpca.process.code_files import ROOT
 CAUSES_TRACK, HARD_TRACK, FRAMES_TRACK, SCANS_TRACK = ("causes", "hard", "frames", "scans")
 DEFAULT = "default"  # run
 READS = ("descriptors/{source}/seed{seed}.npz", "reenactments/{source}/seed{seed}.npz")
-TRAINING_FOLDERS = ("causes", "descriptors", "reenactments")
 LIKE_TABLE_9 = "The measures are those of Table IX (docs/causes.md); the last row has counterfactual access."
 
 
@@ -123,7 +122,7 @@ _TRACKS = (
         predictions="frame_diagnoses/seed{seed}.csv",
         labeled_by=("explainer",),
         read=READS[1:],
-        training_folders=TRAINING_FOLDERS,
+        training_folders=("causes", "descriptors", "reenactments"),
         without_training="learn from the track causes",
         groups="Starts",
     ),

@@ -74,7 +74,7 @@ class MethodTrial(NamedTuple):
 
 @dataclass(frozen=True)
 class FewSamples(TrackSamples):
-    """Forty small samples of one source, ten of them to be answered, which no published row is of."""
+    """Forty small samples of the last source and the first seed, ten of them to be answered."""
 
     whole: Mapping[str, Any] = field(default_factory=dict)
 
@@ -86,18 +86,14 @@ class FewSamples(TrackSamples):
         return {**self.whole, "causes": {**self.whole["causes"], **FEW}, "controls": controls}
 
     def parts(self) -> list[tuple[str, int, np.ndarray]]:
-        """Return the last source, which is large, and the first seed."""
+        """Return the only part."""
         return [(list(self.whole["sources"])[-1], self.whole["seeds"][0], np.arange(TEN))]
 
 
 def try_on_few(samples: TrackSamples, name: str, entry: ExplainerEntry, settings: Mapping[str, Any]) -> None:
-    """Let a method learn and answer within seconds, so that its faults are known before all samples are made.
-
-    On frames and scans, too, it is tried on the samples of the track of causes. Explainers with further training
-    samples are not tried.
-    """
+    """Let a method learn and answer before all samples are made; on frames and scans, those of the track of causes."""
     track, explain = (samples.track, _hard) if samples.track.name == HARD_TRACK else (TRACKS[CAUSES_TRACK], _causes)
-    if entry.further:
+    if entry.further:  # which takes thousands of samples
         return
     print(f"{name}: a first try on ten samples", file=sys.stderr)
     with TemporaryDirectory() as folder:
