@@ -109,6 +109,7 @@ def make_sets(
     source: str,
     seed: int,
     settings: ShiftSettings,
+    unseen_objects: bool = True,
 ) -> ShiftedSets:
     """Make, embed by the source's encoder and measure all sets of one source and seed; `other` is another source's.
 
@@ -117,11 +118,18 @@ def make_sets(
     """
     from gpca.encoders.training import embed, train_encoder
 
-    measured = [sets_of_encoder(objects, registrations, other, embed_own, source, seed, settings)]
+    beyond, _ = make_registrations(objects, f"{source} severity", seed, settings.beyond)
+    parts = {"in_distribution": registrations, "severity": beyond}
+    if other is not None:
+        parts["source"] = other.subset(other.rows("test")[: settings.samples])
+    for name in list(parts)[1:]:
+        h_S_d, _ = embed_own(parts[name], f"{source} {name}")
+        parts[name] = replace(parts[name], attached={"embedding": h_S_d})
+    measured = [_measured(parts, source, seed, settings)]
     held_out_S = unseen(registrations.fold, seed)
     if held_out_S is None:
         held_out_S = drawn(registrations.cluster, settings.held_out_share, source, seed, "held-out objects")
-    if held_out_S.any():
+    if unseen_objects and held_out_S.any():
         is_train_S = registrations.split == "train"
         train = np.flatnonzero(~held_out_S & is_train_S)[: settings.train]
         seen = registrations.subset(np.concatenate([train, np.flatnonzero(~held_out_S & ~is_train_S)]))
@@ -138,26 +146,6 @@ def make_sets(
         parts["objects"] = replace(parts["objects"], split=np.full(count, "test"), sample=np.arange(count))
         measured.append(_measured(parts, source, seed, settings))
     return ShiftedSets.joined(measured)
-
-
-def sets_of_encoder(
-    objects: ObjectClouds,
-    registrations: Registrations,
-    other: Registrations | None,
-    embed_own: Embed,
-    source: str,
-    seed: int,
-    settings: ShiftSettings,
-) -> ShiftedSets:
-    """The sets of the source's encoder; arguments as of :func:`make_sets`."""
-    beyond, _ = make_registrations(objects, f"{source} severity", seed, settings.beyond)
-    parts = {"in_distribution": registrations, "severity": beyond}
-    if other is not None:
-        parts["source"] = other.subset(other.rows("test")[: settings.samples])
-    for name in list(parts)[1:]:
-        h_S_d, _ = embed_own(parts[name], f"{source} {name}")
-        parts[name] = replace(parts[name], attached={"embedding": h_S_d})
-    return _measured(parts, source, seed, settings)
 
 
 def _measured(parts: dict[str, Registrations], source: str, seed: int, settings: ShiftSettings) -> ShiftedSets:

@@ -70,7 +70,7 @@ def retrain(job: Job) -> None:
     """Make the sets of samples within other severities, from the random numbers of the protocol."""
     from gpca.encoders.registry import EncoderSettings
     from gpca.encoders.training import embedding_by, train_encoder
-    from gpca.steps.shift import ShiftSettings, sets_of_encoder
+    from gpca.steps.shift import ShiftSettings, make_sets
 
     axes = (job.source, job.seed)
     parts = {name: job.section(name) for name in ("shift", "registrations", "encoder")}
@@ -82,7 +82,7 @@ def retrain(job: Job) -> None:
         model, _ = train_encoder(samples, *axes, encoder_settings, checkpoint)
         embed_own = embedding_by(model, job.seed, encoder_settings)
         samples = replace(samples, attached={"embedding": embed_own(samples, job.source)[0]})
-        sets_of_encoder(objects, samples, None, embed_own, *axes, settings).save(job.out, axes)
+        make_sets(objects, samples, None, embed_own, *axes, settings, unseen_objects=False).save(job.out, axes)
         checkpoint.unlink(missing_ok=True)
 
 
