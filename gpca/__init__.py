@@ -10,7 +10,7 @@ _EXPORTS = {
     "judge": "gpca.model.explainer",
     "load": "gpca.tracks.loading",
     "repair": "gpca.model.explainer",
-    "repair_scans": "gpca.model.scan_repair",
+    "repair_scans": "gpca.model.scan_explainer",
 }
 __all__ = ["__version__", *_EXPORTS]
 

@@ -28,6 +28,7 @@ COMMANDS = {  # those for a registration of one's own first, then those for a ru
 }
 WITH_SETTINGS = ("label", "bench", "check-reference")  # the others use none
 MODULES = {  # modules of gpca.commands with several commands; others have the name of their command
+    "repair": "explain",
     **dict.fromkeys(("bench", "score", "leaderboard", "ship-predictions"), "tracks"),
     **dict.fromkeys(("compare", "check-config", "check-reference"), "runs"),
 }

@@ -1,4 +1,4 @@
-"""Command ``explain``: why a user's registrations are uncertain and what to do, on stdout."""
+"""Commands ``explain``, why registrations are uncertain and what to do, and ``repair``, which puts them right."""
 
 from __future__ import annotations
 
@@ -52,6 +52,14 @@ def add_explain_arguments(parser: ArgumentParser) -> None:
     parser.set_defaults(out=None, repairs_alone=False)
 
 
+def add_repair_arguments(parser: ArgumentParser) -> None:
+    add_registration_arguments(parser, "put right as it is: nothing is registered first")
+    out = "write the pose that is good or repaired; where none is, nothing is written"
+    parser.add_argument("--out", type=Path, metavar="FILE", help=out)
+    of_explain = dict.fromkeys(("save_pose", "estimator", "png", "queue")) | {"uncertainty": False, "fast": False}
+    parser.set_defaults(**of_explain, repair=False, repairs_alone=True)
+
+
 def add_registration_arguments(parser: ArgumentParser, given_pose: str) -> None:
     """Declare the clouds and what both commands ask of them; `given_pose` says what is done with a pose."""
     add = parser.add_argument
@@ -77,7 +85,7 @@ def add_registration_arguments(parser: ArgumentParser, given_pose: str) -> None:
 def run_explain(options: Namespace) -> int:
     """Read all files, then explain and print one source after the other; everything but results goes to stderr.
 
-    Returns 2 if a source or row of several has a fault, else the largest status of an explanation.
+    Returns 2 if a source or row of several has a fault, else the largest status of an explanation or a repair.
     """
     _require_options(options)
     path = None if options.scans else model_path(options.model)
@@ -132,8 +140,7 @@ def run_explain(options: Namespace) -> int:
     learned, names, extra = LEARNED, dict[str, str](), dict[str, str]()
     if path is None:
         from gpca.model.clouds import read_pose
-        from gpca.model.scan_explainer import explain_scans
-        from gpca.model.scan_repair import repair_scans
+        from gpca.model.scan_explainer import explain_scans, repair_scans
 
         explain = partial(
             repair_scans if options.repairs_alone else explain_scans,
@@ -190,6 +197,9 @@ def run_explain(options: Namespace) -> int:
             explain_one(each, each.read(read_target))
     print(learned, file=sys.stderr)
     return FAULTY_STATUS if FAULTY_STATUS in statuses else max(statuses)
+
+
+run_repair = run_explain
 
 
 def _length(text: str, unit: str) -> float:
