@@ -58,6 +58,7 @@ def learner_titles(config: Mapping[str, Any]) -> dict[str, str]:
 
 EXPERIMENT = Experiment(
     name="out_of_distribution",
+    beside=("uncertainty_curves",),
     sections={"learners": ByName, "shift": Shift},
     names=lambda config, sources: {"learner": list(config["learners"])},
     check=check,

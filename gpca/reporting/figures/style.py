@@ -33,6 +33,17 @@ SMALL_PT = 7  # No letters are smaller.
 MOST_LEVELS = 2  # of 255 by which a palette may change a channel
 UNDATED = dict.fromkeys(("CreationDate", "ModDate", "Producer", "Creator"))  # metadata of a PDF
 
+# Where many methods share a panel, the paper's have a color, a line and a width, and all others are gray.
+METHOD_LOOKS: dict[str, tuple[str, Any, float]] = {
+    "gpca_paper": (BLUE, (0, (4, 2)), 1.8),
+    "gpca": (BLUE, "-", 1.8),
+    "gpca_matern": (SKY_BLUE, "-", 1.4),
+    "learner_forest": (VERMILION, "-", 1.4),
+    "learner_linear_svm": (ORANGE, "-", 1.4),
+    "gpca_pair": (GREEN, "-", 1.8),
+}
+OTHER_LOOK = (LIGHT_GRAY, "-", 0.9)
+
 
 def use_style() -> Any:
     """Set matplotlib to its defaults and `MATPLOTLIBRC`, whatever a user's file says, and return its ``pyplot``."""

@@ -1,0 +1,191 @@
+"""How useful the uncertainty of learners is: risk over coverage, reliability, uncertainty over distance (Table V)."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from gpca.attribution.diagnostics import BINS
+from gpca.attribution.learner_predictions import read_learner_predictions, sets_of, wrong
+from gpca.declarations.plan import Run
+from gpca.declarations.result import Figure, figure
+from gpca.errors import InputError
+from gpca.evaluation.intervals import mean_interval, wilson_interval
+from gpca.experiments.out_of_distribution import SECTION, learner_titles
+from gpca.pairs.shifted_sets import DISTANCES, with_training_like
+from gpca.reporting.figures import style
+from gpca.reporting.figures.panels import in_lines, legend_below, panels
+
+SETS = {  # those of which Table V, alone or under shift, has ρ
+    "in_distribution": "like the training",
+    with_training_like("severity"): "+ stronger severities",
+    with_training_like("source"): "+ another source",
+    with_training_like("objects"): "+ unseen objects",
+}
+COVERAGES = np.linspace(0, 1, 101)
+ENOUGH = 0.1  # the axis ignores smaller shares of the samples, where a single error decides the risk
+DISTANCE_BINS = 10  # of equally many samples
+FEWEST = 5  # samples of a bin of confidence that has a point
+PREDICTIONS, SET_FILES = "learners/{source}/{learner}/seed{seed}.csv", "shifted/{source}/seed{seed}.npz"
+
+
+@figure(
+    SECTION,
+    "Risk over coverage",
+    """Share of errors among the most confident samples, over the share that is kept. The curve falls towards the left
+    if a classifier knows what it does not know; the axis may cut it below 10 %. Bands are 95 % intervals over the
+    seeds. The area under it is the AURC of Table V (the paper's AUC), which has every classifier.""",
+    learned=(read_learner_predictions, {"prediction_files": PREDICTIONS}),
+)
+def coverage_risk(run: Run, learned: Mapping) -> Figure:
+    shown, columns = _shown(run, learned)
+    drawing, [axes] = _panels(1, columns, 2.6, "coverage (%)")
+    highest = 0.0
+    for panel, source in zip(axes, columns, strict=True):
+        for learner in reversed(shown):
+            risks = []
+            for rows in _of(learned, source, learner, "in_distribution"):
+                wrong_S = wrong(rows)[rows["max_score"].to_numpy().argsort(kind="stable")]  # from the surest on
+                kept_S = np.arange(1, len(rows) + 1)
+                risks.append(100 * np.interp(COVERAGES, kept_S / len(rows), np.cumsum(wrong_S) / kept_S))
+            if risks:
+                mean, low, high = np.array([mean_interval(risk_R) for risk_R in np.transpose(risks)]).T
+                panel.plot(100 * COVERAGES, mean, **_look(learner))
+                band = {"color": _look(learner)["color"], "alpha": 0.15, "linewidth": 0}
+                panel.fill_between(100 * COVERAGES, np.maximum(low, 0), np.minimum(high, 100), **band)
+                highest = max(highest, float(mean[COVERAGES >= ENOUGH].max()))
+        drawn = panel.get_lines()
+        if drawn and not any(curve.get_ydata().any() for curve in drawn):
+            panel.text(0.5, 0.5, "no errors", transform=panel.transAxes, ha="center", va="center")
+    axes[0].set_ylabel("errors among\nthe covered (%)")
+    axes[0].set(xlim=(0, 100), ylim=(0, 1.05 * highest or 1))
+    _write_legend(drawing, shown)
+    return drawing
+
+
+@figure(
+    SECTION,
+    "Reliability",
+    """Accuracy over confidence: above the diagonal a classifier is underconfident, below it overconfident. Vertical
+    lines are Wilson's intervals (95 %) of independent samples. The number is the calibration error of the samples of
+    all seeds together (pooled ECE); Table V has the mean of each seed's own.""",
+    learned=(read_learner_predictions, {"prediction_files": PREDICTIONS}),
+)
+def reliability(run: Run, learned: Mapping) -> Figure:
+    shown, columns = _shown(run, learned)
+    drawing, axes = _panels(len(shown), columns, 0.7 + 1.3 * len(shown), "largest score")
+    for row, learner in zip(axes, shown, strict=True):
+        row[0].set_ylabel(f"{in_lines(shown[learner])}\naccuracy", fontsize=style.SMALL_PT)
+        for panel, source in zip(row, columns, strict=True):
+            panel.plot([0, 1], [0, 1], color=style.GRAY, linewidth=0.6, linestyle=(0, (4, 3)))
+            parts = _of(learned, source, learner, "in_distribution")
+            if parts:
+                rows = pd.concat(parts)
+                gap = _draw_reliability(panel, 1 - rows["max_score"].to_numpy(), ~wrong(rows), _look(learner)["color"])
+                words = f"ECE {gap:.3f}, $n$ = {len(rows)}"
+                panel.text(0.03, 0.96, words, transform=panel.transAxes, va="top", fontsize=style.SMALL_PT)
+    axes[0, 0].set(xlim=(0, 1.02), ylim=(0, 1.25), yticks=(0, 0.5, 1))
+    return drawing
+
+
+def _draw_reliability(panel, confidence_S: np.ndarray, right_S: np.ndarray, color: str) -> float:
+    """Draw the accuracy of each bin of confidence with Wilson's interval; return the expected calibration error."""
+    bin_S = np.minimum((confidence_S * BINS).astype(int), BINS - 1)
+    parts = [bin_S == bin_ for bin_ in range(BINS) if (bin_S == bin_).sum() >= FEWEST]
+    mean_B, right_B = [confidence_S[part].mean() for part in parts], [right_S[part].mean() for part in parts]
+    low_B, high_B = zip(*(wilson_interval(right_S[part].sum(), part.sum()) for part in parts), strict=True)
+    panel.vlines(mean_B, low_B, high_B, color=color, linewidth=0.7)
+    panel.plot(mean_B, right_B, "o-", color=color, markersize=2.5, linewidth=1.0)
+    return float(np.abs(np.bincount(bin_S, weights=confidence_S - right_S, minlength=BINS)).sum() / len(right_S))
+
+
+@figure(
+    SECTION,
+    "Uncertainty over distance to the training samples",
+    """Uncertainty over the distance to the training samples, the mean in ten bins of equally many: in distribution,
+    and with the samples of each shift; ρ of Table V is the rank correlation of the two. Bands are 95 % intervals of
+    independent samples, and n counts those of all seeds. The distance is the mean to the ten nearest training samples,
+    in the paper's classic (analytical) features, each in units of its standard deviation over the training samples.""",
+    learned=(read_learner_predictions, {"prediction_files": PREDICTIONS, "set_files": SET_FILES}),
+)
+def uncertainty_vs_distance(run: Run, learned: Mapping) -> Figure:
+    shown, columns = _shown(run, learned)
+    parts = {key: sets_of(rows) for key, rows in learned.items() if key[0] in columns and key[1] in shown}
+    down = [name for name in SETS if any(name in sets for sets in parts.values())]
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+    drawing, axes = _panels(len(down), columns, 0.9 + 1.2 * len(down), "distance to the training samples")
+    for row, name in enumerate(down):
+        for panel, source in zip(axes[row], columns, strict=True):
+            samples = 0
+            for learner in reversed(shown):
+                seeds = [sets[name] for key, sets in parts.items() if key[:2] == (source, learner) and name in sets]
+                if seeds:
+                    distance, mean, half = distance_curve(seeds)
+                    panel.plot(distance, mean, **_look(learner))
+                    band = {"color": _look(learner)["color"], "alpha": 0.15, "linewidth": 0}
+                    panel.fill_between(distance, np.maximum(mean - half, 0), mean + half, **band)
+                    samples = sum(map(len, seeds))
+            panel.text(0.03, 0.96, f"$n$ = {samples}", transform=panel.transAxes, va="top", fontsize=style.SMALL_PT)
+        axes[row, 0].set_ylabel(f"{SETS[name]}\n1 - largest score", fontsize=style.SMALL_PT)
+    for panel in axes[-1]:
+        panel.set_xscale("log")
+        panel.xaxis.set_major_locator(LogLocator(base=2))
+        panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        panel.xaxis.set_minor_locator(NullLocator())
+    axes[0, 0].set_ylim(bottom=0)
+    _write_legend(drawing, shown)
+    style.write_title(drawing, "Means in bins of equally many of the n samples, and their 95 % intervals")
+    return drawing
+
+
+def _panels(rows: int, sources: Mapping[str, str], height_in: float, across: str) -> tuple[Figure, np.ndarray]:
+    """Panels with a column for each source, and what they have across."""
+    drawing, axes = panels(rows, len(sources), height_in, sharex=True, sharey=True)
+    for top, bottom, title in zip(axes[0], axes[-1], sources.values(), strict=True):
+        top.set_title(title)
+        bottom.set_xlabel(across)
+    return drawing, axes
+
+
+def distance_curve(seeds: Sequence) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Median distance and mean of 1 - largest score of `DISTANCE_BINS` bins of equally many samples.
+
+    The third array is half the width of the means' 95 % intervals, by the normal distribution of independent samples.
+    """
+    distance_S, score_S = (
+        np.concatenate([rows[name].to_numpy(float) for rows in seeds]) for name in (DISTANCES[0], "max_score")
+    )
+    bins = np.array_split(np.argsort(distance_S, kind="stable"), min(DISTANCE_BINS, len(distance_S)))
+    halves = [1.96 * score_S[part].std() / np.sqrt(max(len(part) - 1, 1)) for part in bins]
+    medians, means = [np.median(distance_S[part]) for part in bins], [score_S[part].mean() for part in bins]
+    return np.array(medians), np.array(means), np.array(halves)
+
+
+def _look(learner: str) -> dict[str, Any]:
+    """Color, line and width of a learner."""
+    return dict(
+        zip(("color", "linestyle", "linewidth"), style.METHOD_LOOKS.get(learner, style.OTHER_LOOK), strict=True)
+    )
+
+
+def _write_legend(drawing: Figure, shown: Mapping[str, str]) -> None:
+    from matplotlib.lines import Line2D
+
+    legend_below(drawing, [Line2D([], [], label=title, **_look(name)) for name, title in shown.items()])
+
+
+def _shown(run: Run, learned: Mapping) -> tuple[dict[str, str], dict[str, str]]:
+    """Titles of the classifiers that have a look of their own (else of all) and of the sources, with predictions."""
+    present = [{key[place] for key in learned} for place in (0, 1)]
+    sources = {name: title for name, title in run.source_titles.items() if name in present[0]}
+    learners = {name: title for name, title in learner_titles(run.config).items() if name in present[1]}
+    if not learners or not sources:
+        raise InputError("learners", "have no predictions of these sources and learners", "run them first")
+    return {name: learners[name] for name in style.METHOD_LOOKS if name in learners} or learners, sources
+
+
+def _of(learned: Mapping, source: str, learner: str, name: str) -> list:
+    parts = [rows[rows["set"] == name] for key, rows in learned.items() if key[:2] == (source, learner)]
+    return [rows for rows in parts if len(rows)]
