@@ -120,27 +120,11 @@ def require_fitting(subject: str, distances_m: Sequence[float], diameters_m: Seq
         raise InputError(subject, f"their points lie {off} from the models in the annotated poses, {limit}", REMEDY)
 
 
-def points_on_model(instances: Instances, objects: ObjectClouds, most_points: int | None = None) -> np.ndarray:
-    """Return the median distance (I,) in meters of about `most_points` of each instance from its model."""
+def points_on_model(instances: Instances, objects: ObjectClouds) -> np.ndarray:
+    """Return the median distance (I,) in meters of the points of each instance from its model."""
     trees = {index: cKDTree(objects.points(index)) for index in np.unique(instances.object_index)}
-    medians_m = []
-    for i, index in enumerate(instances.object_index):
-        points_m = spread(instances.cloud_m(i), most_points or len(instances.points_m))
-        medians_m.append(median_distance(trees[index], instances.T_camera_object_true[i], points_m))
-    return np.array(medians_m)
-
-
-def require_of_objects(instances: Instances, objects: ObjectClouds, subject: object) -> None:
-    """Raise an InputError that names `subject` unless the instances show these objects at their true poses."""
-    remedy = "regenerate both files in one call"
-    if instances.object_index.min() < 0 or instances.object_index.max() >= len(objects):
-        raise InputError(subject, "shows objects that the object file does not contain", remedy)
-    medians_m = points_on_model(instances, objects, JUDGED_POINTS)
-    distances = medians_m / objects.diameters_m[instances.object_index]
-    if distances.max() > FARTHEST:
-        i = int(distances.argmax())
-        name = objects.names[instances.object_index[i]]
-        raise InputError(subject, f"instance {i} was measured {distances[i]:.2g} diameters from '{name}'", remedy)
+    poses = zip(instances.object_index, instances.T_camera_object_true, strict=True)
+    return np.array([median_distance(trees[index], T, instances.cloud_m(i)) for i, (index, T) in enumerate(poses)])
 
 
 def read_instances(

@@ -81,11 +81,9 @@ def _inputs(job: Job, *files: Path) -> list[Path]:
 
 def _instances(job: Job, name: str) -> tuple[Instances, ObjectClouds]:
     """Instances of that name, and the objects that they show."""
-    from gpca.frames.instances import Instances, require_of_objects
+    from gpca.frames.instances import Instances
 
-    instances, objects = Instances.load(job.instances, (name, None)), ObjectClouds.load(job.objects, name)
-    require_of_objects(instances, objects, job.instances)
-    return instances, objects
+    return Instances.load(job.instances, (name, None)), ObjectClouds.load(job.objects, name)
 
 
 def instances(job: Job) -> None:

@@ -6,7 +6,7 @@ import trimesh
 
 from gpca.errors import InputError
 from gpca.frames.dataset import simplified
-from gpca.frames.instances import Instances, require_of_objects
+from gpca.frames.instances import Instances
 from gpca.io.arrays import save_arrays
 from gpca.objects.surface import Surface
 
@@ -72,21 +72,6 @@ def test_a_faulty_file_is_refused(tiny, tmp_path, name, change, expected):
     save(tiny, tmp_path / "instances.npz", **{name: change})
     with pytest.raises(InputError, match=expected):
         Instances.load(tmp_path / "instances.npz")
-
-
-@pytest.mark.parametrize(
-    ("name", "change", "expected"),
-    [
-        ("object_index", lambda a: a + 99, "objects that the object file does not contain"),
-        ("object_index", lambda a: a - 99, "objects that the object file does not contain"),
-        ("points_m", lambda a: 1000 * a, "was measured"),
-        ("T_camera_object_true", lambda a: np.broadcast_to(a[0], a.shape), "was measured"),
-    ],
-)
-def test_instances_of_other_objects_are_refused(tiny, name, change, expected):
-    changed = changed_columns(tiny[0], {name: change(getattr(tiny[0], name))})
-    with pytest.raises(InputError, match=expected):
-        require_of_objects(changed, tiny[1], "instances.npz")
 
 
 def test_a_scan_is_simplified_and_keeps_its_size():
