@@ -52,6 +52,7 @@ def names(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str
     return {
         "control_seed": list(config["seeds"])[: controls["seeds"]],
         "control": list(RETRAINED),
+        "hard_source": list(controls["hard_sources"]),
         "control_embedding": config["embedding"]["encoder"],
         "transfer_source": list(sources) if TRANSFER in controls["controls"] and len(sources) > 1 else [],
     }
@@ -64,6 +65,7 @@ EXPERIMENT = Experiment(
     names=names,
     check=check,
     optional_entries={"controls.explainers": EXPLAINERS},
+    lists={"controls.hard_sources": "sources"},
 )
 
 
@@ -72,7 +74,8 @@ def _controls_of(plan: Plan, wildcards: Wildcards) -> tuple[list[str], list[str]
 
     Only the first seeds train encoders beyond those of every seed.
     """
-    chosen = plan.config["controls"]["controls"]
+    own = wildcards.source in plan.names["hard_source"]
+    chosen = [name for name in plan.config["controls"]["controls"] if own or name != HARD]
     if int(wildcards.seed) in plan.names["control_seed"][: plan.config["controls"]["encoder_seeds"]]:
         return list(chosen), [name for name in chosen if name in RETRAINED]
     controls = [name for name in chosen if name in samples.OF_EVERY_SEED or name not in RETRAINED]
@@ -85,7 +88,7 @@ def _reenacted(plan: Plan) -> bool:
 
 
 def _of_all(file: str) -> list[str]:
-    return [file.replace("{source}", "{*source}")]
+    return [file.replace("{source}", "{*hard_source}")]
 
 
 def _other_sources(plan: Plan, wildcards: Wildcards) -> list[str]:
@@ -259,6 +262,7 @@ def collect_intervals(run: Run, files: Paths) -> Frame:
                 masks[control, POOLED if control == TRANSFER else ALL] = mask_N
             for key, mask_N in masks.items():
                 same = (rows["control"] == PAPER) & rows["seed"].isin(rows["seed"][mask_N])
+                same &= rows["source"].isin(rows["source"][mask_N])
                 usual_values = _values(rows[same], draws.subset(same.to_numpy()))
                 group_draws = draws.subset(mask_N)
                 group = measured.setdefault(key, {})

@@ -131,7 +131,7 @@ DECIDE = Step(
     inputs={
         "attempts": [
             f"repairs/{CAUSES}/{{*source}}/seed{{*seed}}.npz",
-            f"repairs/{HARD}/{{*source}}/seed{{*control_seed}}.npz",
+            f"repairs/{HARD}/{{*hard_source}}/seed{{*control_seed}}.npz",
             f"repairs/{FRAMES}/{{frames}}/seed{{*frame_cause_seed}}.npz",
             f"repairs/{SCANS}/{{*scan_set}}/seed{{*scan_seed}}.npz",
         ]

@@ -47,6 +47,7 @@ class ControlSettings:
     seeds: Count = 3  # the first so many of the run's
     draw_points: tuple[Points, Points] = (200, 512)  # range of a cloud's random number of points for matched density
     folds: Annotated[int, Bounds(minimum=2, maximum=5)] = 3  # of a source's objects, of which one is unseen
+    hard_sources: Distinct[str] = ()  # that have hard samples
 
     def __post_init__(self) -> None:
         if self.draw_points[0] > self.draw_points[1]:

@@ -100,6 +100,7 @@ _TRACKS = (
         "hard/{source}/seed{seed}.npz",
         "accuracy",
         draws="control intervals",
+        listed="controls.hard_sources",
         clusters="families of objects and seeds",
         measures="AUROC of errors: how well the entropy of the scores tells wrong answers from right ones.",
         seeds="controls.seeds",

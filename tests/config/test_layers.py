@@ -41,8 +41,9 @@ def test_what_is_false_is_left_out_as_if_it_were_not_there(key):
     if key == "uncertainty.oracle":
         config["explainers"]["shap_oracle"] = {}
     # The rows that need it.
-    for section in (never_there["kernel_grid"], never_there["cause_shifts"]):
-        section["sources"] = [name for name in section["sources"] if name in never_there["sources"]]
+    for section, names in (("kernel_grid", "sources"), ("cause_shifts", "sources"), ("controls", "hard_sources")):
+        named = never_there[section][names]
+        never_there[section][names] = [name for name in named if name in never_there["sources"]]
     for part in ("backbones", "training"):
         named = never_there["real_world"][part]
         there = [name for name in named if name in never_there["encoders"]]

@@ -76,7 +76,7 @@ def test_the_parts_of_the_tracks_are_those_of_the_default_config():
     sources, seeds = list(config["sources"]), config["seeds"]
     assert TRACKS["causes"].parts(config) == [(source, seed) for seed in seeds for source in sources]
     hard = config["controls"]["seeds"]
-    assert TRACKS["hard"].parts(config) == [(source, seed) for seed in seeds[:hard] for source in sources]
+    assert TRACKS["hard"].parts(config) == [(source, seed) for seed in seeds[:hard] for source in ("linemod", "ycb")]
     assert TRACKS["frames"].parts(config) == [(REAL_WORLD, seeds[0])]
     assert TRACKS["scans"].parts(config) == [(name, seeds[0]) for name in config["scans"]["datasets"]]
     assert set(TRACKS["scans"].everywhere) <= set(config["scans"]["datasets"])
@@ -90,6 +90,7 @@ def test_shipped_predictions_are_small_whole_and_of_the_config_of_their_track():
         track = TRACKS[path.stem]
         config = track.config()
         published = Published.load(track, path)
-        parts = [(source, seed) for source, seed, _ in published.rows.parts()]
-        assert parts == [part for part in track.parts(config) if part in parts or not track.may_lack(part[0])]
+        parts, wanted = [(source, seed) for source, seed, _ in published.rows.parts()], track.parts(config)
+        known = [part for part in parts if part in wanted]  # the others are of sources that the next run has no more
+        assert known == [part for part in wanted if part in parts or not track.may_lack(part[0])]
         assert set(published.hashes) >= {track.file(*part) for part in parts}
