@@ -188,11 +188,7 @@ class ShareDraws:
 def cluster_draws(
     counterparts: Iterable[Counterpart | None], prediction_files: Iterable[str | Path]
 ) -> dict[Counterpart, ShareDraws]:
-    """Return the shares by the pigeonhole bootstrap over clusters and seeds.
-
-    Counterparts that are no shares of samples, or whose folder has no file, are left out. Files of predictions are
-    named ``…/{predictions or learners}/{source}/{method}/seed{seed}.csv``.
-    """
+    """Return the shares by the pigeonhole bootstrap over clusters and seeds."""
     import pandas as pd
 
     parts: dict[Folder, list[pd.DataFrame]] = defaultdict(list)

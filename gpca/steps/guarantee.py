@@ -1,8 +1,4 @@
-"""Step ``guarantee_scores``: measured causes -> scores by models that were not trained on the families that they score.
-
-An explainer of descriptors or re-enactments is trained on one part of the families and scores all others. Predictions
-of explainers of embeddings are those of the diagnosis, and those of depth frames of the frames' causes.
-"""
+"""Step ``guarantee_scores``: measured causes -> scores by models that were not trained on the families that they score."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace

@@ -54,10 +54,7 @@ def run(job: Job) -> None:
 
 
 def evaluate_grid(registrations: Registrations, grid: KernelGrid, source: str, seed: int) -> tuple[Frame, Frame]:
-    """Return `GRID_COLUMNS`, and the predictions of the test samples, which have `SETTING` as first columns.
-
-    `elbo` is per training sample in nats, `confidence` the mean of the largest score.
-    """
+    """Return `GRID_COLUMNS`, and the predictions of the test samples, which have `SETTING` as first columns."""
     import pandas as pd
 
     from gpca.classifier.gpc import GPC

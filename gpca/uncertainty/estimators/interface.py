@@ -194,10 +194,7 @@ def describe(pair: Pair, outcome: Outcome, moved: Moved) -> np.ndarray:
 
 
 def true_twist(registered: RegisteredPair, T_true: np.ndarray, judge: Judge, moved: Moved) -> np.ndarray:
-    """Return the twist (6,) of the true pose about that of the registration, the symmetric one that is nearest.
-
-    Symmetries are turns of the model: before the pose where the model moves, after it where it is the target.
-    """
+    """Return the twist (6,) of the true pose about that of the registration, the symmetric one that is nearest."""
     T_found = registered.T_target_source
     if moved == "model":
         turn = rigid_motion(symmetric_turn(T_found[:3, :3].T @ T_true[:3, :3], judge.symmetries))

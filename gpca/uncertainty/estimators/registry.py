@@ -32,10 +32,7 @@ def require_estimator_settings(name: str, settings: Mapping[str, object]) -> Non
 def make_estimator(
     name: str, settings: Mapping[str, object] | None = None, examples: Sequence[Example] = ()
 ) -> Callable[[RegisteredPair], CovarianceEstimate]:
-    """Return an estimator as a function from registered pairs to estimates; one that learns needs examples.
-
-    A failure inside it, at learning too, becomes an estimate that says why. Missing examples raise an InputError.
-    """
+    """Return an estimator as a function from registered pairs to estimates; one that learns needs examples."""
     settings = dict(settings or {})
     require_estimator_settings(name, settings)
     entry = estimator_entry(name)
