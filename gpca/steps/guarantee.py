@@ -1,4 +1,4 @@
-"""Step ``guarantee_scores``: measured causes -> scores by models that were not trained on the families that they score."""
+"""Step ``guarantee_scores``: measured causes -> scores by models that saw no sample of the families that they score."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
