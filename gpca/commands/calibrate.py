@@ -60,7 +60,7 @@ def run_calibrate(options: Namespace) -> None:
             raise InputError(place, str(fault)) from fault
     from gpca.model.explainer import Explainer
     from gpca.model.file import Model
-    from gpca.model.tolerance import Tolerance
+    from gpca.model.result import Tolerance
     from gpca.process.progress import progress
 
     tolerance, explainer, read_target = (

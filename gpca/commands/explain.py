@@ -154,7 +154,7 @@ def run_explain(options: Namespace) -> int:
     else:
         from gpca.model.explainer import Explainer
         from gpca.model.file import Model
-        from gpca.model.tolerance import DEFAULT, Tolerance
+        from gpca.model.result import DEFAULT, Tolerance
         from gpca.uncertainty.settings import MONTE_CARLO, UncertaintySettings
 
         tolerance = Tolerance.parse(options.tolerance) if options.tolerance else DEFAULT
@@ -204,7 +204,7 @@ run_repair = run_explain
 
 def _length(text: str, unit: str) -> float:
     """Return the tolerance of scans in the unit of the points; they have no diameter for a share or an angle."""
-    from gpca.model.tolerance import Tolerance
+    from gpca.model.result import Tolerance
 
     tolerance = Tolerance.parse(text)
     if tolerance.unit not in METERS_PER_UNIT:

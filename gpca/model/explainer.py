@@ -26,9 +26,8 @@ from gpca.model.file import Model
 from gpca.model.location import model_path
 from gpca.model.repair import REPAIRED
 from gpca.model.repaired import Repair
+from gpca.model.result import DEFAULT, Tolerance
 from gpca.model.scene import Scene
-from gpca.model.tolerance import DEFAULT as DEFAULT_TOLERANCE
-from gpca.model.tolerance import Tolerance
 from gpca.objects.canonical import CanonicalFrame, thin
 from gpca.objects.surface import as_points
 from gpca.rigid import inverse, transform
@@ -67,7 +66,7 @@ class Explainer:
         estimator: str = MONTE_CARLO,
         fast: bool = False,
         register: bool = True,
-        tolerance: Tolerance | str = DEFAULT_TOLERANCE,
+        tolerance: Tolerance | str = DEFAULT,
         source_unit: str | None = None,
         repair: bool = False,
     ) -> Explanation:
@@ -170,7 +169,7 @@ class Explainer:
         frame: CanonicalFrame | None = None,
         method: str | None = None,
         register: bool = True,
-        tolerance: Tolerance | str = DEFAULT_TOLERANCE,
+        tolerance: Tolerance | str = DEFAULT,
         source_unit: str | None = None,
     ) -> Repair:
         """Register and, if the result is wrong, put it right (docs/repair.md); arguments as of :meth:`explain`."""

@@ -3,7 +3,7 @@ import pytest
 
 from gpca.alignment.pose_error import PoseErrors
 from gpca.errors import InputError
-from gpca.model.tolerance import Tolerance
+from gpca.model.result import Tolerance
 from gpca.rigid import exp
 
 BALL = np.random.default_rng(0).normal(size=(4000, 3))
