@@ -129,10 +129,9 @@ def test_columns_are_written_and_read_as_by_pandas(tmp_path):
         "score_pose": np.where(np.arange(300) % 7, random.random(300), np.nan).astype(np.float32),
         "abstained": np.arange(300) % 2 == 0,
     }
-    for form in ("%.6f", "%.6g"):
-        write_csv(tmp_path / "pandas.csv", pd.DataFrame(columns), form)
-        write_columns(tmp_path / "own.csv", columns, form)
-        assert (tmp_path / "own.csv").read_bytes() == (tmp_path / "pandas.csv").read_bytes()
+    write_csv(tmp_path / "pandas.csv", pd.DataFrame(columns), "%.6f")
+    write_columns(tmp_path / "own.csv", columns)
+    assert (tmp_path / "own.csv").read_bytes() == (tmp_path / "pandas.csv").read_bytes()
     names = ("sample", "split", "seconds")
     write_columns(tmp_path / "own.csv", {name: columns[name] for name in names})
     own, expected = (read(tmp_path / "own.csv", names, ("seconds",)) for read in (read_columns, read_numbers))
