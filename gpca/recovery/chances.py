@@ -66,7 +66,7 @@ def alarm_threshold(failure_M: np.ndarray, false_alarms: float) -> float:
 class Trial:
     """A rehearsed action."""
 
-    known_F: np.ndarray  # see :func:`gpca.recovery.rehearsal.policy_inputs`
+    known_F: np.ndarray  # see :func:`gpca.recovery.loop.policy_inputs`
     action: str  # its name; `NOTHING` if the registration was left as it was
     right: bool  # whether the pose was right afterwards
 

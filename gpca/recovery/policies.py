@@ -33,7 +33,7 @@ class Case:
     scores_T_C: np.ndarray | None  # of the explainer at the start and after each action; None without one
     bald_T: np.ndarray | None
     observed_F: np.ndarray | None  # at the start (:data:`gpca.recovery.actions.OBSERVED`), for the gate
-    known_F: np.ndarray | None  # all features (:func:`gpca.recovery.rehearsal.policy_inputs`), for trained policies
+    known_F: np.ndarray | None  # all features (:func:`gpca.recovery.loop.policy_inputs`), for trained policies
     cause: str  # of the failure, for the oracle only; otherwise empty
     random: np.random.Generator  # of the case, restarted for every decision
     reenacted: CauseEffects | None = None  # the current registration, for policies that read it

@@ -28,13 +28,12 @@ from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.synthesis import as_registrations
 from gpca.process.progress import progress
+from gpca.recovery import loop as closed_loop
 from gpca.recovery.actions import FEWEST_POINTS, Action, Robot, action_of, look_around
 from gpca.recovery.answers import learn_explainers
 from gpca.recovery.chances import learn_utility
 from gpca.recovery.episodes import Attempt, Episode, find_episodes, register_first
-from gpca.recovery.loop import Loop, Reenactor, calibrated_alarm
 from gpca.recovery.policies import Means, PolicyEntry, policy_entry
-from gpca.recovery.rehearsal import Rehearsal, rehearse, rehearsed_gate, rehearsed_order, robot_policy, summary
 from gpca.recovery.settings import LoopSettings, RecoverySettings
 from gpca.rigid import inverse
 from gpca.seeds import generator
@@ -72,17 +71,19 @@ def run(job: Job) -> None:
         rehearsals = replace(loop, failures=recovery["rehearsals"])
         rehearsed = find_episodes(tables["rehearsals"], rehearsals) if learning else []
         learner = next((entry.explainer for entry in entries if entry.learns or entry.queues), "")
-        rehearsal = rehearse(rehearsed, actions, learner, explain[learner], loop) if learner else None
+        rehearsal = closed_loop.rehearse(rehearsed, actions, learner, explain[learner], loop) if learner else None
         means = _means(recovery, entries, actions, registered, rehearsed, rehearsal, loop)
-        reenactor = Reenactor(settings.reenactment, settings.counterfactuals)
+        reenactor = closed_loop.Reenactor(settings.reenactment, settings.counterfactuals)
         if any(entry.alarmed for entry in entries):
             fresh = [*registered["train"], *registered["test"], *rehearsed]  # of which it has learned nothing
-            means = replace(means, alarm=calibrated_alarm(fresh, reenactor, recovery["gate"]["false_alarms"]))
-        content = summary(means)
+            alarm = closed_loop.calibrated_alarm(fresh, reenactor, recovery["gate"]["false_alarms"])
+            means = replace(means, alarm=alarm)
+        content = closed_loop.summary(means)
         print(json.dumps(content), file=sys.stderr)
         write_text(job.policy, json.dumps(content, indent=1, sort_keys=True) + "\n")
         episodes = find_episodes(tables["failures"], loop)
-        rows, seconds = Loop(episodes, actions, explain, means, loop, axes, reenactor).run(recovery["policies"])
+        closed = closed_loop.Loop(episodes, actions, explain, means, loop, axes, reenactor)
+        rows, seconds = closed.run(recovery["policies"])
         write_csv(job.rows, rows)
         write_csv(job.timings, seconds)
         views = recovery["actions"].get(ACTION) or {}
@@ -95,7 +96,7 @@ def _means(
     actions: Mapping[str, Action],
     registered: Mapping[str, Sequence[Episode]],
     rehearsed: Sequence[Episode],
-    rehearsal: Rehearsal | None,
+    rehearsal: closed_loop.Rehearsal | None,
     loop: LoopSettings,
 ) -> Means:
     """What the policies are made from; what none of them needs is not learned."""
@@ -104,10 +105,10 @@ def _means(
     if rehearsal:
         utility = learn_utility(rehearsal.trials.values(), costs, tuple(actions), recovery["needless"])
     if any(entry.rehearsed for entry in entries):
-        order = rehearsed_order(failures, actions, costs, loop)
+        order = closed_loop.rehearsed_order(failures, actions, costs, loop)
     if any(entry.gated for entry in entries):
-        gate = rehearsed_gate({**registered, "rehearsals": rehearsed}, recovery["gate"]["false_alarms"])
-    return Means(robot_policy(recovery, rehearsal), tuple(actions), utility, order or (), gate)
+        gate = closed_loop.rehearsed_gate({**registered, "rehearsals": rehearsed}, recovery["gate"]["false_alarms"])
+    return Means(closed_loop.robot_policy(recovery, rehearsal), tuple(actions), utility, order or (), gate)
 
 
 def lay_tables(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gpca.recovery.rehearsal import Rehearsal, robot_policy
+from gpca.recovery.loop import Rehearsal, robot_policy
 
 SECTION = {
     "thresholds": {"uncertain": None, "queued_share": 0.5, "dominant": 0.4, "improvement": 0.3},
