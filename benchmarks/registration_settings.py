@@ -39,6 +39,7 @@ CANDIDATES: dict[str, list[tuple[dict, dict]]] = {  # method -> (its settings, w
     "point_to_plane": [({}, {})],
     "trimmed": [({}, {})],
     "multistart": [*(({"overlap": share}, {}) for share in (0.5, 0.7, 0.9)), ({"wide_distance": 0.1}, {})],
+    "multistart_likelihood": [({}, {}), ({"wide_distance": 0.1}, {})],
     "cpd": [({"outliers": share}, {}) for share in (0.01, 0.1, 0.3)],
     "fgr": [
         ({}, {}),

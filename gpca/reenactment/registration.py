@@ -19,6 +19,7 @@ from gpca.alignment.methods.interface import (
 )
 from gpca.alignment.methods.local import align_compiled
 from gpca.reenactment.hypotheses import (
+    LAST_ITERATIONS,
     find_hypotheses,
     first_of_alike,
     log_prior,
@@ -26,12 +27,14 @@ from gpca.reenactment.hypotheses import (
     search_starts,
     weights_of,
 )
+from gpca.reenactment.mixture import Mixture
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
 from gpca.rigid import inverse, rigid_motion, scale_translation, transform
 from gpca.seeds import generator
 from gpca.settings import Bounds, Positive, PositiveShare
 
+JUDGED = 24  # ends of the least cost, whose likelihoods are compared
 TURNS = 96  # starts at turns of any size, where there is no initial pose
 
 
@@ -83,6 +86,7 @@ def align(
 
 
 def align_from_many(
+    by_likelihood: bool,
     pair: Pair,
     wide_distance: Positive = 0.25,
     correspondence_distance: float = CORRESPONDENCE_DISTANCE,
@@ -91,7 +95,11 @@ def align_from_many(
     points: Annotated[int, Bounds(minimum=FEWEST)] = 512,
     unit: Positive = 1.0,
 ) -> Outcome:
-    """Return the end of ICP from many starts, on `points`, whose share `overlap` of least distances fits best."""
+    """Run ICP from the starts of the search on `points` of the source, at first within `wide_distance`.
+
+    The result, at last on all points, is the end of the least mean square over the smallest distances, the share
+    `overlap` of all, or of the best of these the likeliest under the mixture, whose width and outliers are fitted.
+    """
     frame = Frame(pair, pair.T_target_source_init, unit)
     kept = generator("registration", "many starts", pair.seed).permutation(len(frame.source))[:points]
     few, ends_n = frame.source[np.sort(kept)], search_starts(frame.source, frame.target)
@@ -101,13 +109,23 @@ def align_from_many(
         ends_n = ends_n[first_of_alike(ends_n)]
     tree, counted = cKDTree(frame.target), max(FEWEST, round(overlap * len(few)))
     distance_n_N = np.sort([tree.query(transform(T, few))[0] for T in ends_n], axis=1)
-    square_n = np.square(distance_n_N[:, :counted]).mean(axis=1)
-    best = frame.pose(ends_n[np.argmin(square_n)])
+    order_n = np.argsort(np.square(distance_n_N[:, :counted]).mean(axis=1), kind="stable")
+    if by_likelihood:
+        order_n = order_n[:JUDGED]
+        mixture = Mixture(frame.target, ModelSurface(frame.target).spacing / 2)
+        fits = mixture.fit(few, ends_n[order_n], LAST_ITERATIONS, moving=False)
+        order_n = order_n[np.argsort(-fits.log_likelihood_n, kind="stable")]
+    best = frame.pose(ends_n[order_n[0]])
     return align_compiled(pair.started_at(best), correspondence_distance, max_iterations)
 
 
 METHODS = {
     "posterior": MethodEntry("EM from many starts, initial pose as prior", partial(align, True), points_only=True),
     "posterior_global": MethodEntry("EM from many starts", partial(align, False), is_global=True, points_only=True),
-    "multistart": MethodEntry("ICP from many starts, least trimmed cost", align_from_many, points_only=True),
+    "multistart": MethodEntry(
+        "ICP from many starts, least trimmed cost", partial(align_from_many, False), points_only=True
+    ),
+    "multistart_likelihood": MethodEntry(
+        "ICP from many starts, likeliest end", partial(align_from_many, True), points_only=True
+    ),
 }

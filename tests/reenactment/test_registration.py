@@ -25,7 +25,7 @@ def turned():
     return Pair(moved, target, seed=1), T_true
 
 
-@pytest.mark.parametrize("name", ["posterior", "posterior_global", "multistart"])
+@pytest.mark.parametrize("name", ["posterior", "posterior_global", "multistart", "multistart_likelihood"])
 def test_many_starts_reach_what_one_does_not(turned, name):
     pair, T_true = turned
     many, one = (make_method(each)(pair) for each in (name, "point_to_point"))
