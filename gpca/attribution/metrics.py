@@ -39,48 +39,24 @@ def confusion(
     return np.array([[np.sum(column & (concept_true_S == true)) for column in columns] for true in concepts])
 
 
-def permuted_accuracy(confusion_C_C1: np.ndarray) -> float:
-    """Return the largest accuracy over all one-to-one relabelings of the predicted concepts (Kuhn 1955), a bound."""
-    from scipy.optimize import linear_sum_assignment
-
-    named_C_C = confusion_C_C1[:, :-1]
-    return float(named_C_C[linear_sum_assignment(named_C_C, maximize=True)].sum() / confusion_C_C1.sum())
-
-
 def read_uncertainties(path: str | Path) -> tuple[pd.Series, float]:
     """Return the uncertainty (nats) of each observed pair by (split, sample), and the clean ones' 95th percentile."""
+    import pandas as pd
+
     rows = read_csv(path, _CAUSAL_COLUMNS, others=("uncertainty_*",))
     require_samples(path, rows)
     limit = numbers(path, rows, "uncertainty_clean").quantile(CAUSAL_QUANTILE)
-    return numbers(path, rows, "uncertainty_observed").set_axis(_samples(rows)), float(limit)
+    samples = pd.MultiIndex.from_frame(rows[["split", "sample"]])
+    return numbers(path, rows, "uncertainty_observed").set_axis(samples), float(limit)
 
 
-def read_causal(path: str | Path) -> pd.Series:
-    """Return whether each sample, by (split, sample), is causal: more uncertain than 95 % of the clean pairs."""
-    observed, limit = read_uncertainties(path)
-    return observed > limit
-
-
-def collect(prediction_files: Iterable[str | Path], causal_files: Iterable[str | Path] = ()) -> pd.DataFrame:
-    """Return tidy metrics of `…/{source}/{explainer}/seed{seed}.csv`, causal ones for those of `causal_files`."""
-    causal = {}
-    for path in causal_files:
-        source, _, seed = source_method_seed(path)
-        causal[source, seed] = (path, read_causal(path))
+def collect(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
+    """Return the tidy metrics (results/README.md) of prediction files named `…/{source}/{explainer}/seed{seed}.csv`."""
     records = []
     for path in prediction_files:
         source, method, seed = source_method_seed(path)
         test = _test_rows(path, read_predictions(path))
         metrics = attribution_metrics(test, concepts_of(test))
-        if (source, seed) in causal:
-            causal_path, is_causal = causal[source, seed]
-            keys = _samples(test)
-            if not (listed := keys.isin(is_causal.index)).all():
-                fault = f"lacks {' sample '.join(keys[~listed][0])} of {path}"
-                raise InputError(causal_path, fault, "regenerate both from the same config")
-            shown = test[is_causal[keys].to_numpy()]
-            metrics["causal_samples"] = {ALL: len(shown)}
-            metrics |= {"causal_accuracy": concept_accuracy(*_judged(shown), ())} if len(shown) else {}
         for metric, values in metrics.items():
             records += [("attribution", source, method, metric, c, seed, float(v)) for c, v in values.items()]
     return tidy(records, "predictions")
@@ -96,7 +72,6 @@ def attribution_metrics(test: pd.DataFrame, concepts: list[str]) -> dict[str, di
         "test_samples": {ALL: len(test)} | samples,
         "clusters": {ALL: test["cluster"].nunique()} | test.groupby("concept_true")["cluster"].nunique().to_dict(),
         "abstention_rate": {ALL: test["abstained"].mean()},
-        "permuted_accuracy": {ALL: permuted_accuracy(counts)},
         "icp_calls": {ALL: test["icp_calls"].mean()},
     }
     for predicted, column in zip((*concepts, ABSTAINED), counts.T, strict=True):
@@ -113,12 +88,6 @@ def _test_rows(path: str | Path, rows: pd.DataFrame) -> pd.DataFrame:
 
 def _judged(rows: pd.DataFrame) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return tuple(rows[name].to_numpy() for name in ("concept_true", "concept_predicted", "abstained"))
-
-
-def _samples(rows: pd.DataFrame) -> pd.MultiIndex:
-    import pandas as pd
-
-    return pd.MultiIndex.from_frame(rows[["split", "sample"]])
 
 
 def collect_timings(timing_files: Iterable[str | Path]) -> pd.DataFrame:

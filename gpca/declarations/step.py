@@ -8,7 +8,7 @@ values in one job, which is given them as a list under the plural of the name; a
 import json
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import reduce
 from itertools import product
 from operator import getitem
@@ -19,7 +19,6 @@ from gpca.declarations.plan import Run
 from gpca.encoders.registry import encoders
 
 BRACED = re.compile(r"{(\*?)(\w+)}")
-OUTSIDE = "outside_"  # with a name behind it, the wildcard of entries from outside the suite
 Wildcards = Any
 Settings = tuple[str, ...] | Callable[["Plan", Wildcards], Mapping[str, Any]]
 Files = str | Sequence[str] | Callable[["Plan", Wildcards], str | Sequence[str]]
@@ -69,8 +68,6 @@ class Step:
         modules: returns the modules chosen at run time, by plan, which count as code of the step.
         modules_of_job: returns those that a job chooses, by plan and wildcards.
         where: wildcard, or name behind an asterisk -> the name of its values, if another.
-        apart: name in the outputs, and the function that returns which of its values have jobs of their own, so that an
-            edit of code from outside reruns nothing else.
         target: name of the rule that asks for all outputs, if there is one.
         when: tells whether a run has the step.
         priority, threads, resources: of its jobs.
@@ -86,7 +83,6 @@ class Step:
     modules: Callable[[Plan], Iterable[str]] = lambda plan: ()
     modules_of_job: Callable[[Plan, Wildcards], Iterable[str]] | None = None
     where: Mapping[str, str] = field(default_factory=dict)
-    apart: tuple[str, Callable[[Plan], Sequence[str]]] | None = None
     target: str = ""
     when: Callable[[Plan], bool] = lambda plan: True
     priority: int = 0
@@ -113,18 +109,6 @@ class Rule:
     resources: dict[str, Any]
 
 
-def rules_of(step: Step, plan: Plan) -> list[Rule]:
-    """Rules of a step: one, and a second for the entries from outside."""
-    if not step.when(plan):
-        return []
-    if step.apart is None:
-        return [_rule(step, plan, step.name)]
-    name, outside_of = step.apart
-    outside = list(outside_of(plan))
-    inside = [value for value in plan.names[_source(step, name)] if value not in outside]
-    return [_rule(step, _with(plan, step, name, inside), step.name), _rule_outside(step, plan, name, outside)]
-
-
 def plural(name: str) -> str:
     """Argument of a job that holds a list: ``methods``, ``strategies``."""
     return f"{name[:-1]}ies" if name.endswith("y") else f"{name}s"
@@ -136,7 +120,8 @@ def all_files(step: Step, plan: Plan) -> list[str]:
     return [file for pattern in patterns for file in _expanded(step, plan, BRACED.sub(r"{*\2}", pattern))]
 
 
-def _rule(step: Step, plan: Plan, name: str) -> Rule:
+def rule_of(step: Step, plan: Plan) -> Rule:
+    """The rule of a step."""
     patterns = [each for outputs in step.outputs.values() for each in _listed(outputs)]
     in_outputs = dict.fromkeys(found for each in patterns for found in BRACED.findall(each))
     values = {wildcard: plan.names.get(_source(step, wildcard)) for _, wildcard in in_outputs}
@@ -147,7 +132,7 @@ def _rule(step: Step, plan: Plan, name: str) -> Rule:
         return lambda wildcards: function(*given, wildcards)
 
     return Rule(
-        name=name,
+        name=step.name,
         run=step.run,
         inputs={
             key: later(_resolved, step, plan, files) if callable(files) else _files(step, plan, files)
@@ -166,47 +151,11 @@ def _rule(step: Step, plan: Plan, name: str) -> Rule:
             for wildcard in wildcards
             if wildcard != "seed" and values[wildcard] is not None
         },
-        place="/".join([name, *(f"{{{wildcard}}}" for wildcard in wildcards)]),
+        place="/".join([step.name, *(f"{{{wildcard}}}" for wildcard in wildcards)]),
         priority=step.priority,
         threads=step.threads,
         resources=dict(step.resources),
     )
-
-
-def _rule_outside(step: Step, plan: Plan, name: str, outside: Sequence[str]) -> Rule:
-    """Rule with a job for each value of a name from outside."""
-    wildcard = f"{OUTSIDE}{name}"
-
-    def of(wildcards: Wildcards) -> Plan:
-        return _with(plan, step, name, [getattr(wildcards, wildcard)])
-
-    patterns = {
-        key: [each.replace(f"{{*{name}}}", f"{{{wildcard}}}") for each in _listed(pattern)]
-        for key, pattern in step.outputs.items()
-        if any(f"{{*{name}}}" in each for each in _listed(pattern))
-    }
-    rule = _rule(replace(step, outputs=patterns, apart=None), _with(plan, step, name, []), f"{step.name}_outside")
-
-    def resolved(files: Callable) -> Callable[[Wildcards], str | list[str]]:
-        return lambda wildcards: _resolved(step, of(wildcards), files, wildcards)
-
-    def returned(value: Callable) -> Callable[[Wildcards], Any]:
-        return lambda wildcards: value(of(wildcards), wildcards)
-
-    dynamic = {key: resolved(files) for key, files in step.inputs.items() if callable(files)}
-    given = {key: returned(value) for key, value in step.params.items() if callable(value)}
-    return replace(
-        rule,
-        inputs=rule.inputs | dynamic,
-        modules=lambda wildcards: (step.run, *step.modules(of(wildcards))),
-        settings=lambda wildcards: _as_json(step, of(wildcards), wildcards),
-        params=rule.params | given | {plural(name): lambda wildcards: [getattr(wildcards, wildcard)]},
-        constraints=rule.constraints | {wildcard: "|".join(outside) or "none"},
-    )
-
-
-def _with(plan: Plan, step: Step, name: str, values: Sequence[str]) -> Plan:
-    return replace(plan, names={**plan.names, _source(step, name): list(values)})
 
 
 def _source(step: Step, name: str) -> str:

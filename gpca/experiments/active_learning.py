@@ -112,7 +112,6 @@ LEARN = Step(
     outputs={"out": "active_learning/{source}/{*strategy}/seed{seed}.csv"},
     settings=_seed_settings,
     modules=lambda plan: filter(None, map(strategy_module, plan.names["strategy"])),
-    apart=("strategy", lambda plan: [name for name in plan.names["strategy"] if strategy_module(name)]),
     priority=4,
 )
 

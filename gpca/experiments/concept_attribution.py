@@ -1,30 +1,29 @@
 """How often each explainer names the concept that was perturbed, and at what cost (Tables I and II)."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import replace
-from itertools import permutations
 from math import inf
+from pathlib import Path
 
 import numpy as np
 
-from gpca.attribution.metrics import read_causal
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.declarations.experiment import Experiment, Tidy
 from gpca.declarations.plan import Run
 from gpca.declarations.result import Frame, Paths, table
 from gpca.errors import InputError
-from gpca.evaluation.intervals import Clustered, Estimate
-from gpca.evaluation.measures import ALL, intervals, read_all_metrics, source_method_seed
+from gpca.evaluation.intervals import Clustered
+from gpca.evaluation.measures import ALL, Measure, by_value, over_seeds, read_all_metrics, read_samples
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.registry import explainer_entry
 from gpca.reporting.sheet import Row, Sheet, Show, crossed, show, where, with_label
 from gpca.reporting.tables.builder import over_clusters
 from gpca.reporting.tables.cells import cell_of_repeats
-from gpca.reporting.tables.table import EMPTY, Cell, Column
+from gpca.reporting.tables.table import Cell, Column
 from gpca.reporting.words import span
 
 PREDICTIONS = "predictions/{source}/{explainer}/seed{seed}.csv"
-PREDICTED = {"prediction_files": PREDICTIONS, "causal_files": "uncertainty/{source}/causal/seed{seed}.csv"}
+PREDICTED = {"prediction_files": PREDICTIONS}
 TIMINGS = {"timing_files": "timings/{source}/{explainer}/seed{seed}.csv"}
 EXPERIMENT = Experiment(
     name="concept_attribution",
@@ -36,87 +35,42 @@ EXPERIMENT = Experiment(
 )
 
 
-def collect_intervals(prediction_files: Paths, causal_files: Paths = ()) -> Frame:
+def collect_intervals(prediction_files: Paths) -> Frame:
     """Accuracies of `metrics.csv` over all seeds, with 95 % intervals (:mod:`gpca.evaluation.measures`).
 
-    - accuracy: of all test samples and of each concept; an abstained sample is wrong.
-    - permuted_accuracy: mean over the seeds of each one's accuracy under its best renaming of the concepts.
-    - causal_accuracy: of the causal samples, where there are causal files.
-
-    The draws of a source are the same for all explainers that explain the same samples.
+    The accuracy is of all test samples and of each concept; an abstained sample is wrong. The draws of a source are the
+    same for all explainers that explain the same samples.
     """
     import pandas as pd
 
-    causal_paths = {source_method_seed(path)[::2]: path for path in causal_files}
-    parts: dict[tuple[str, str], list[Frame]] = {}
-    for path in prediction_files:
-        source, method, seed = source_method_seed(path)
+    def read(path: Path) -> Frame:
         rows = read_predictions(path)
-        rows = rows[rows["split"] == "test"].assign(seed=seed)
+        rows = rows[rows["split"] == "test"]
         if rows.empty:
             raise InputError(path, "has no test rows", "regenerate it")
-        if causal_path := causal_paths.get((source, seed)):
-            causal, keys = read_causal(causal_path), pd.MultiIndex.from_frame(rows[["split", "sample"]])
-            if not keys.isin(causal.index).all():
-                raise InputError(causal_path, f"lacks samples of {path}", "regenerate both from the same config")
-            rows["causal"] = causal[keys].to_numpy(bool)
-        parts.setdefault((source, method), []).append(rows)
-    records = []
-    for (source, method), seeds in parts.items():
-        rows = pd.concat(seeds, ignore_index=True)
+        return rows
+
+    def by_concept(rows: Frame) -> dict[str, np.ndarray]:
+        return by_value(rows, "concept_true", concepts_of(rows))
+
+    right = Measure(lambda rows: (rows["concept_true"] == rows["concept_predicted"]) & ~rows["abstained"])
+    frames = []
+    samples = read_samples(prediction_files, read).assign(table="attribution")
+    for (source, _), rows in samples.groupby(["source", "method"], sort=False):
         draws = Clustered.drawn(rows["seed"], rows["cluster"], "attribution intervals", source)
-        for metric, concept, subset, estimate in _accuracies(rows, draws):
-            records.append(subset.record(("attribution", source, method, metric, concept), estimate))
-    return intervals(records, "predictions")
-
-
-def _accuracies(rows: Frame, draws: Clustered) -> Iterator[tuple[str, str, Clustered, Estimate]]:
-    """Yield metric, concept, the samples that it is over, and its estimate."""
-    concepts = concepts_of(rows)
-    true_N, named_N = (rows[name].to_numpy(str) for name in ("concept_true", "concept_predicted"))
-    named_N = np.where(rows["abstained"], "", named_N)
-    right_N = true_N == named_N
-    is_true_C_N, is_named_C_N = (np.array([each_N == name for name in concepts]) for each_N in (true_N, named_N))
-
-    def permuted(rows_n: np.ndarray, weights_B_n: np.ndarray) -> np.ndarray:
-        hits_C_C_n, number = is_true_C_N[:, None, rows_n] & is_named_C_N[None, :, rows_n], range(len(concepts))
-        renamings = [hits_C_C_n[number, list(order)].any(axis=0) for order in permutations(number)]
-        best_B = np.max([(weights_B_n * hit_n).sum(axis=1) for hit_n in renamings], axis=0)
-        with np.errstate(divide="ignore", invalid="ignore"):  # a draw without any sample has no value
-            return best_B / weights_B_n.sum(axis=1)
-
-    yield "accuracy", ALL, draws, draws.share(right_N)
-    for concept, mask_N in zip(concepts, is_true_C_N, strict=True):
-        if mask_N.any():
-            subset = draws.subset(mask_N)
-            yield "accuracy", concept, subset, subset.share(right_N[mask_N])
-    yield "permuted_accuracy", ALL, draws, draws.over_seeds(permuted, (0, 1))
-    if "causal" in rows and (mask_N := rows["causal"].eq(True).to_numpy()).any():
-        subset = draws.subset(mask_N)
-        yield "causal_accuracy", ALL, subset, subset.share(right_N[mask_N])
+        frames.append(over_seeds(rows.reset_index(drop=True), by_concept, {"accuracy": right}, draws))
+    return pd.concat(frames, ignore_index=True)
 
 
 SECTION = "IV-B Concept attribution accuracy"
-LEAST_CAUSAL = 30  # causal samples of all seeds; the accuracy on fewer says nothing
 EXTENDED = {
     "accuracy": show("accuracy", "Accuracy (%)"),
-    "permuted_accuracy": show("permuted_accuracy", "Relabeled (%)"),
-    "causal_accuracy": show("causal_accuracy", "Causal (%)"),
-    "causal_samples": Column("n causal", decimals=0, interval=False, limits=(0, inf)),
     "abstention_rate": Column("Abstained (%)", interval=False),
     "icp_calls": Column("ICP calls", decimals=0, interval=False, limits=(0, inf)),
     "seconds_per_sample": Column("Seconds", decimals=3, interval=False, limits=(0, inf)),
     "test_samples": Column("n", decimals=0, interval=False, limits=(0, inf)),
 }
 NOTES = {
-    "permuted_accuracy": (
-        "Relabeled: accuracy under the best one-to-one renaming of the predicted concepts, which takes the truth "
-        "to find; where it is far above the accuracy, concepts are separated but named wrongly."
-    ),
-    "causal_accuracy": (
-        "Causal: accuracy on the n causal samples whose uncertainty lies above the 95th percentile of the clean "
-        f"ones of their dataset and seed; {EMPTY} where there are fewer than {LEAST_CAUSAL} in all seeds."
-    ),
     "icp_calls": "ICP calls: ICP runs per sample beyond the observed registration.",
     "seconds_per_sample": "Seconds: all that one sample takes, the observed registration included; "
     "the one column that differs from run to run.",
@@ -179,8 +133,7 @@ def table2_per_concept(run: Run, intervals):
     "Table I, extended: every explainer",
     """Every explainer of this suite, including the paper's three, on the same test samples, with its cost.
 
-    Oracles are given what the others have to infer, so they bound their family from above. If the relabeled accuracy
-    is far above the accuracy, an explainer separates the concepts but misnames them.""",
+    Oracles are given what the others have to infer, so they bound their family from above.""",
     intervals="attribution_intervals.csv",
     metrics=(read_all_metrics, ("metrics.csv", "timings.csv")),
 )
@@ -190,9 +143,8 @@ def table1_extended(run: Run, intervals, metrics):
     def more(row: Row, _subset: Frame) -> dict[str, Cell | None]:
         measured = where(metrics, {**row.where, "concept": ALL})
         cells = {}
+        samples = int(where(measured, {"metric": "test_samples"})["value"].sum())
         for metric in [metric for metric, column in EXTENDED.items() if not isinstance(column, Show)]:
-            counted = "causal_samples" if metric == "causal_samples" else "test_samples"
-            samples = int(where(measured, {"metric": counted})["value"].sum())
             values_R = where(measured, {"metric": metric})["value"].to_numpy()
             cells[metric] = cell_of_repeats(values_R * (100 if metric == "abstention_rate" else 1), samples)
         return cells
@@ -201,8 +153,7 @@ def table1_extended(run: Run, intervals, metrics):
     rows = with_label(rows, lambda row: entries[row.where["method"]].sight)
     rows = [replace(row, rival=not entries[row.where["method"]].oracle) for row in rows]
     heads = {"source": "Dataset", "explainer": "Explainer", "reads": "Reads"}
-    enough = intervals[(intervals["metric"] != "causal_accuracy") | (intervals["samples"] >= LEAST_CAUSAL)]
-    sheet = Sheet("table1_extended", heads, rows, EXTENDED, enough, more=more)
+    sheet = Sheet("table1_extended", heads, rows, EXTENDED, intervals, more=more)
     filled = {metric for _, metric in sheet.cells}
     apart = ", oracles apart" if any(entry.oracle for entry in entries.values()) else ""
     notes = {"accuracy": f"Bold: best accuracy on the dataset{apart}. Abstained samples are wrong.", **NOTES}

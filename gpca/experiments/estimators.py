@@ -16,7 +16,6 @@ from gpca.errors import InputError, with_key
 from gpca.evaluation.intervals import Clustered, interval
 from gpca.evaluation.measures import source_method_seed, tidy
 from gpca.io import csv_file
-from gpca.process.plugins import is_outside
 from gpca.settings import part_of
 from gpca.uncertainty.estimates import KINDS, REFERENCES, EstimatorPairSettings, read_estimate_files
 from gpca.uncertainty.estimators import registry
@@ -77,10 +76,6 @@ ESTIMATE = Step(
         *map(registry.estimator_module, _asked(plan)),
         *map(method_module, plan.config["estimator_pairs"]["methods"]),
     ],
-    apart=(
-        "estimate",
-        lambda plan: [name for name in plan.config["estimators"] if is_outside(registry.estimator_module(name))],
-    ),
     target="estimates",
     priority=2,
 )

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +17,6 @@ from gpca.io.csv_file import numbers as number_column
 from gpca.io.csv_file import read_numbers
 from gpca.reporting.figures.style import BLACK, BLUE, COLUMN_WIDTH_IN, GRAY, ORANGE
 from gpca.reporting.sheet import Row, Sheet, show
-from gpca.reporting.tables.builder import interval_over
-from gpca.reporting.tables.cells import cell_of_repeats
-from gpca.reporting.tables.table import Cell
 from gpca.settings import Distinct
 from gpca.steps.kernel_grid import GRID_COLUMNS, MEASURES, PRINTED, SETTING, KernelGrid
 
@@ -106,13 +102,6 @@ def collect_intervals(run: Run, files: Paths) -> Frame:
 SECTION = "IV-D Ablation studies"
 TITLES = {"rbf": "RBF", "matern32": "Matérn 3/2", "polynomial": "Polynomial, p = 2"}
 HEADS = {"kernel": "Kernel", "learning_rate": "Rate", "iterations": "Iterations"}
-COLUMNS = {
-    "accuracy": show("accuracy", "Accuracy (%)"),
-    "confidence": show("confidence", "Confidence (%)", of_samples=False),
-    "ece": show("ece", "ECE (share)", factor=1, decimals=3, limits=(0, 1), least_is_best=True),
-    "nll": show("nll", "NLL (nats)", factor=1, decimals=3, limits=(0, inf), least_is_best=True),
-    "elbo": show("elbo", "ELBO (nats)", decimals=3, limits=(-inf, inf)),  # over the seeds
-}
 
 
 @table(
@@ -129,7 +118,7 @@ def table4_kernels(run: Run, intervals):
     columns = {name: show("accuracy", title, where={"source": name}) for name, title in titles(run).items()}
     sheet = Sheet("table4_kernels", HEADS, rows, columns, intervals)
     caption = "Accuracy of the GPC by kernel and schedule (%)" + stand_ins(run, intervals)
-    note = "The rows that the paper prints; table4_grid has all, with their confidence."
+    note = "The rows that the paper prints; kernels.csv has all combinations, with confidence and calibration."
     return sheet.table(caption, "source", [f"{over(sheet)}.", note], bold=columns)
 
 
@@ -210,38 +199,6 @@ def printed_accuracies(source: str) -> dict[tuple[str, float, int], float]:
             kernel, rate, iterations = number.counterpart.methods[0].split("-")
             printed[kernel, float(rate), int(iterations)] = number.value
     return printed
-
-
-@table(
-    SECTION,
-    "Table IV, extended: every combination",
-    """All combinations of kernel, learning rate and iterations, with confidence and calibration. Accuracy and
-    confidence diverge if training stops early: such a classifier is right long before it is sure.""",
-    grid=(read_grids, GRID_FILES),
-    intervals="kernel_intervals.csv",
-)
-def table4_grid(run: Run, grid, intervals):
-    settings = list(grid[list(SETTING)].drop_duplicates().itertuples(index=False, name=None))
-    rows = [
-        Row([(source, title), *labels(setting)], {"source": source, "method": setting_name(*setting)})
-        for source, title in titles(run).items()
-        for setting in settings
-    ]
-    elbos = {(source, setting_name(*each)): of["elbo"] for (source, *each), of in grid.groupby(["source", *SETTING])}
-
-    def more(row: Row, _subset: Frame) -> dict[str, Cell | None]:
-        return {"elbo": cell_of_repeats(elbos.get((row.where["source"], row.where["method"]), ()), 0)}
-
-    sheet = Sheet("table4_grid", {"source": "Dataset", **HEADS}, rows, COLUMNS, intervals, more=more)
-    notes = (
-        f"{over(sheet)}. Bold: best accuracy and NLL of a dataset.",
-        "Confidence: mean of the largest score. ECE: its gap to the accuracy over 15 equally wide bins, mean of "
-        f"each seed's own. ELBO: per training sample, mean over the seeds; {interval_over(sheet.seeds)}. If it still "
-        "rises from row to row and the confidence lies far below the accuracy, the fit was stopped before it had "
-        "converged.",
-    )
-    caption = "The GPC by kernel, learning rate and iterations" + stand_ins(run, intervals)
-    return sheet.table(caption, "measure", notes, bold=["accuracy", "nll"], same=1)
 
 
 def titles(run: Run) -> dict[str, str]:

@@ -14,7 +14,8 @@ from gpca.declarations.result import Frame, Paths, table
 from gpca.declarations.step import Plan, Step
 from gpca.encoders.registry import EncoderChanges
 from gpca.errors import InputError, require_names, with_key
-from gpca.experiments.recovery_measures import ERROR, SEQUENCE, pool_share
+from gpca.evaluation.measures import ALL
+from gpca.experiments.recovery_measures import ERROR, SEQUENCE
 from gpca.explainers.registry import explainer_entry, explainer_module, require_settings
 from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.frames.situations import SituationSettings
@@ -28,7 +29,7 @@ from gpca.pairs.synthesis import TestSamples, TrainSamples
 from gpca.recovery.actions import ACTIONS, action_of
 from gpca.recovery.policies import PolicyEntry, named_policies, policies, policy_entry, policy_module
 from gpca.recovery.settings import LoopSettings
-from gpca.reporting.sheet import Row, Sheet, show
+from gpca.reporting.sheet import Row, Sheet, show, where
 from gpca.reporting.tables.builder import over_clusters
 from gpca.reporting.tables.cells import plain_cell
 from gpca.reporting.tables.table import Table
@@ -242,9 +243,11 @@ def table8_recovery(
     }
     rows = [Row([(name, title)], {"method": name}) for name, title in policy_titles(run.config).items()]
     sheet = Sheet("table8_recovery", {"policy": "Policy"}, rows, columns, pd.concat([intervals, differences]))
+    of_all = where(metrics, {"concept": ALL}).pivot_table(index=["method", "seed"], columns="metric", values="value")
+    costs = (of_all["cost"] * of_all["episodes"]).groupby("method").sum() / of_all["episodes"].groupby("method").sum()
     for i, row in enumerate(sheet.rows):
-        cost, _ = pool_share(metrics, row.where["method"], "cost") or (None, 0)
-        for key, value in {"cost": cost, "seconds": seconds.get(row.where["method"])}.items():
+        name = row.where["method"]
+        for key, value in {"cost": costs.get(name), "seconds": seconds.get(name)}.items():
             if value is not None:
                 sheet.cells[i, key] = plain_cell(value, seeds, sheet.cells[i, first].test_samples)
     failures = sheet.cells[0, first].test_samples

@@ -20,8 +20,6 @@ TABLE = "recovery"  # `table` and `source` of the rows
 ERRORS = ("error_before", "error_after")
 RECOVERY_COLUMNS = ("episode", "cause", "table", "policy", "step", "action", "failed", *ERRORS, "recovered", "tries")
 CASE = ["seed", "table", "episode"]
-FIRST = "first_"  # with an action or the queue behind it, a metric of the confusion
-WEIGHTS = {"wrong_first": "acted_first", "acted_nominal": "nominal", "cost_nominal": "nominal"}
 SEQUENCE, ERROR = "sequence", "error"  # kinds of rivals
 FILES = "recovery/seed{seed}.csv"
 
@@ -44,9 +42,8 @@ def is_action(rows: Frame) -> Series:
 @numbers("recovery.csv", files=FILES)
 def collect(run: Run, files: Paths) -> Frame:
     """Measures by policy, cause and seed; results/README.md lists them."""
-    recovery = run.config["recovery"]
-    treatments, costs, budget = dict(recovery["treatments"]), dict(recovery["costs"]), recovery["loop"]["budget"]
-    records = []
+    recovery, records = run.config["recovery"], []
+    costs, budget = dict(recovery["costs"]), recovery["loop"]["budget"]
     for path in files:
         rows = read_recovery(path)
         for policy, episodes in rows.groupby("policy", sort=False):
@@ -54,51 +51,26 @@ def collect(run: Run, files: Paths) -> Frame:
                 subset = episodes if cause == ALL else episodes[episodes["cause"] == cause]
                 if not subset["failed"].any():
                     continue
-                values = policy_metrics(subset, treatments, costs, budget)
+                values = policy_metrics(subset, costs, budget)
                 keys, seed = (TABLE, TABLE, policy), rows["seed"].iloc[0]
                 records += [(*keys, metric, cause, seed, float(value)) for metric, value in values.items()]
     return tidy(records, "recovery")
 
 
-def policy_metrics(
-    rows: Frame, treatments: Mapping[str, str], costs: Mapping[str, float], budget: int
-) -> dict[str, float]:
+def policy_metrics(rows: Frame, costs: Mapping[str, float], budget: int) -> dict[str, float]:
     """Measures of one policy on the failures among the rows, and how often it acts on the others."""
-
-    def mean_cost(rows: Frame, registrations: int) -> float:
-        return float(rows["action"].map(costs).sum() / registrations)
-
     fine, rows = rows[~rows["failed"]], rows[rows["failed"]]
     first = rows[rows["step"] == 1]
-    acted = first[is_action(first)]
     episodes = first["episode"].nunique()
     values = {
         f"recovered_within_{k}": rows[rows["recovered"] & (rows["step"] <= k)]["episode"].nunique() / episodes
         for k in range(1, budget + 1)
     }
-    values |= {"episodes": episodes, "acted_first": len(acted), "tries": first.groupby("cause")["tries"].first().sum()}
-    if len(acted):
-        values["wrong_first"] = float((acted["action"] != acted["cause"].map(treatments)).mean())
+    values |= {"episodes": episodes, "tries": first.groupby("cause")["tries"].first().sum()}
     values["queued"] = rows[rows["action"] == QUEUE]["episode"].nunique() / episodes
     values["left_alone"] = float((first["action"] == NOTHING).mean())
-    values["actions"] = float(is_action(rows).sum() / episodes)
-    values["cost"] = mean_cost(rows, episodes)
-    values["nominal"] = len(fine)
-    if len(fine):
-        values |= {"acted_nominal": float(is_action(fine).mean()), "cost_nominal": mean_cost(fine, len(fine))}
-    counts = first["action"].value_counts()
-    return values | {FIRST + action: counts.get(action, 0) for action in (*treatments.values(), QUEUE)}
-
-
-def pool_share(metrics: Frame, policy: str, metric: str, concept: str = ALL) -> tuple[float, int] | None:
-    """Share over the failures of all seeds, or what `WEIGHTS` names, and their number; None where there is none."""
-    weight = WEIGHTS.get(metric, "episodes")
-    rows = metrics[(metrics["method"] == policy) & (metrics["concept"] == concept)]
-    share_R, count_R = (rows[rows["metric"] == name].set_index("seed")["value"] for name in (metric, weight))
-    if share_R.empty:
-        return None
-    weight_R = count_R[share_R.index]
-    return float((share_R * weight_R).sum() / weight_R.sum()), int(weight_R.sum())
+    values |= {"cost": float(rows["action"].map(costs).sum() / episodes), "nominal": len(fine)}
+    return values | ({"acted_nominal": float(is_action(fine).mean())} if len(fine) else {})
 
 
 @numbers("recovery_intervals.csv", files=FILES)

@@ -23,7 +23,6 @@ from gpca.io.csv_file import numbers as number_column
 from gpca.io.csv_file import read_csv
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.process.plugins import is_outside
 from gpca.reporting.sheet import Row, Sheet, show
 from gpca.reporting.tables.builder import missing_packages
 from gpca.steps.registration_trials import INITIAL, NO_START, SEVERITY_COLUMNS, PairSettings
@@ -69,12 +68,6 @@ def _registered(plan: Plan) -> list[str]:
     return list(dict.fromkeys([*plan.names["method"], plan.config["method_pairs"]["global_start"]]))
 
 
-def _outside(plan: Plan) -> list[str]:
-    """Methods from outside, but for the global start, which all jobs run."""
-    start = plan.config["method_pairs"]["global_start"]
-    return [name for name in plan.names["method"] if is_outside(registry.method_module(name)) and name != start]
-
-
 REGISTER = Step(
     name="register_methods",
     run="gpca.steps.registration_trials",
@@ -88,7 +81,6 @@ REGISTER = Step(
         "methods": {name: plan.config["methods"][name] for name in _registered(plan)},
     },
     modules=lambda plan: map(registry.method_module, _registered(plan)),
-    apart=("method", _outside),
     target="methods",
     priority=2,
 )
@@ -232,6 +224,14 @@ ERRORS = {
 }
 LEAD: dict[str, Any] = {"where": {"against": RIVAL}, "limits": (-100.0, 100.0)}
 NO_INTERVAL: dict[str, Any] = {"interval": False, "limits": (0, inf)}
+SEVERITIES = {
+    f"{cause}_{name}": show("success", f"{cause.capitalize()}, {name} (%)", f"{cause}_{name}", decimals=0)
+    for cause in CONCEPTS
+    for name in BINS
+} | {
+    f"lead_{cause}": show("success", f"{cause.capitalize()}, lead (points)", cause, decimals=0, **LEAD)
+    for cause in CONCEPTS
+}
 COSTS = {
     "points": show("points", "Points", factor=1, frame="metrics", decimals=0, **NO_INTERVAL),
     "milliseconds": show("seconds", "ms", factor=1e3, frame="seconds", least_is_best=True, **NO_INTERVAL),
@@ -243,72 +243,29 @@ COSTS = {
     "Table XI: registration methods",
     """How often each method registers the same pairs correctly, how far it is off and how long it takes. Compare only
     rows of one start: the pair's own initial pose is the true one for noise and overlap, so a local method can only
-    lose it, while a global method has to find it. The paper uses ICP alone.""",
+    lose it, while a global method has to find it. CSV also has successes by severity and by the error that is
+    allowed. The paper uses ICP alone.""",
     **INTERVALS,
     metrics="registration_methods.csv",
     seconds=(read_seconds, "timings/{source}/method_{method}/seed{seed}.csv"),
 )
 def table11_registration(run: Run, intervals, metrics, seconds):
     by_seed = {"metrics": metrics, "seconds": seconds}
-    columns = CAUSES | {"lead": show("success", "Lead (points)", **LEAD)} | ERRORS | COSTS
-    sheet = Sheet("table11_registration", HEADS, rows_of(run), columns, intervals, by_seed, list(run.sources))
+    columns = CAUSES | {"lead": show("success", "Lead (points)", **LEAD)} | ERRORS | COSTS | SEVERITIES
+    for limit in run.config["success"]["curve"]:
+        columns[success_within(limit)] = show(success_within(limit), f"Off by less than {100 * limit:g} % d (%)")
+    rows = method_rows(run.config["methods"], run.config["method_pairs"]["global_start"])
+    sheet = Sheet("table11_registration", HEADS, rows, columns, intervals, by_seed, list(run.sources))
     note = (
         "Lead: how many more succeed than by the best other method of the same start, pair by pair. "
         "Errors are means over all registrations, at the last pose of those that failed; rotations up to the object's "
         "symmetries. Failed: given up by the method itself, or not at rest. Points: of a cloud, on average over "
         "sources and targets; behind a global start, the local method's. ms: of one registration, with its global "
-        "start if it has one, without the normals; the only column that differs from run to run."
+        "start if it has one, without the normals; the only column that differs from run to run. Low, middle, high: "
+        "thirds of what is drawn; a pose error counts by the mean of its places in the two ranges."
     )
     caption = "Registrations that succeed, and how far all are off" + run.stand_ins()
     return sheet.table(caption, "metric", [*notes(run, sheet, intervals), note], bold=CAUSES | ERRORS, same=1)
-
-
-@table(
-    SECTION,
-    "Table XI by the error that is allowed",
-    """The successes of the same registrations if other errors are allowed. A method whose row rises from left to right
-    comes near the right pose more often than it reaches it.""",
-    needs=("method",),
-    **INTERVALS,
-)
-def table11_limits(run: Run, intervals):
-    curve = run.config["success"]["curve"]
-    columns = {(name := success_within(limit)): show(name, f"{100 * limit:g} % d (%)") for limit in curve}
-    sheet = Sheet("table11_limits", HEADS, rows_of(run), columns, intervals)
-    caption = "Registrations that succeed, by the error that is allowed" + run.stand_ins()
-    return sheet.table(caption, "error below", notes(run, sheet, intervals), bold=columns, same=1, keep_empty=True)
-
-
-@table(
-    SECTION,
-    "Table XI by severity",
-    """The successes of the same registrations by cause and severity. A row that falls from low to high shows what the
-    method does not tolerate.""",
-    needs=("method",),
-    **INTERVALS,
-)
-def table11_severity(run: Run, intervals):
-    columns = {
-        f"{cause}_{name}": show("success", f"{cause.capitalize()}, {name} (%)", f"{cause}_{name}", decimals=0)
-        for cause in CONCEPTS
-        for name in BINS
-    }
-    leads = {
-        f"lead_{cause}": show("success", f"{cause.capitalize()}, lead (points)", cause, decimals=0, **LEAD)
-        for cause in CONCEPTS
-    }
-    sheet = Sheet("table11_severity", HEADS, rows_of(run), columns | leads, intervals)
-    pairs = {key: cell.test_samples for (_, key), cell in sheet.cells.items()}
-    note = (
-        "Low, middle, high: thirds of what is drawn; a pose error counts by the mean of its places in the two ranges. "
-        f"Lead: as in Table XI. Pairs of all seeds, by column: {', '.join(str(pairs.get(key, 0)) for key in columns)}."
-    )
-    caption = "Registrations that succeed, by cause and severity (%)" + run.stand_ins()
-    return sheet.table(caption, "cause", [*notes(run, sheet, intervals), note], bold=columns, same=1, keep_empty=True)
-
-
-def rows_of(run: Run) -> Iterable[Row]:
-    return method_rows(run.config["methods"], run.config["method_pairs"]["global_start"])
 
 
 def method_rows(names: Iterable[str], global_start: str, initial: str = "Initial pose") -> Iterable[Row]:

@@ -245,7 +245,8 @@ def _notes(run: Run, sheet: Sheet, intervals: Frame, parts: Iterable[str]) -> li
     SECTION,
     "Table XVII: registration of scans",
     """How often each method registers one scan to another, by how much they overlap. Local methods start at the true
-    pose disturbed by a rung of a ladder, and again at a global method's. Compare only rows of one start.""",
+    pose disturbed by a rung of a ladder, and again at a global method's. Compare only rows of one start. CSV also has
+    successes by rung.""",
     **INTERVALS,
     seconds=(read_seconds, "timings/{scan_set}/method_{scan_method}/seed{scan_seed}.csv"),
 )
@@ -258,36 +259,28 @@ def table17_scans(run: Run, intervals, seconds):
         FAILED: show(FAILED, "Failed (%)", interval=False, least_is_best=True),
         "seconds": show("seconds", "s", factor=1, frame="seconds", **seconds_look),
     }
-    heads = {"data": "Scans", "start": "Start", "method": "Method"}
-    sheet = Sheet("table17_scans", heads, _rows(run), columns, intervals, {"seconds": seconds})
+    rungs = {(rung := Rung(**each)).name: rung for each in run.config["scans"]["ladder"]}
+    columns |= {
+        key: show(RECALL, f"From {rung.rotation_deg:g}°, {rung.translation_m:g} m (%)", key)
+        for key, rung in rungs.items()
+    }
+    sheet = Sheet(
+        "table17_scans",
+        {"data": "Scans", "start": "Start", "method": "Method"},
+        _rows(run),
+        columns,
+        intervals,
+        {"seconds": seconds},
+        blank=lambda row, key: key in rungs and row.labels[1][0] != INITIAL,
+    )
     note = (
         "Failed: given up by the method itself, or not at rest; the pose counts in the other columns all the same. "
         "s: of one registration, with its global start if it has one, without voxels and normals; the only column "
-        "that differs from run to run."
+        "that differs from run to run. From: of the local registrations that start with that error of the pose."
     )
     footnotes = [*_notes(run, sheet, intervals, strata), note]
     caption = "Registrations of scans that succeed, by overlap"
     return sheet.table(caption, "overlap", footnotes, bold=columns, same=2, keep_empty=True)
-
-
-@table(
-    SECTION,
-    "Table XVII by the start",
-    """The successes of the same local registrations by the error of the pose at which they start. A row that falls
-    from left to right shows how far a method reaches.""",
-    needs=("scan_set", "scan_method"),
-    **INTERVALS,
-)
-def table17_ladder(run: Run, intervals):
-    rungs = {(rung := Rung(**each)).name: rung for each in run.config["scans"]["ladder"]}
-    columns = {
-        key: show(RECALL, f"{rung.rotation_deg:g}°, {rung.translation_m:g} m (%)", key) for key, rung in rungs.items()
-    }
-    rows = (Row([row.labels[0], row.labels[2]], row.where) for row in _rows(run) if row.labels[1][0] == INITIAL)
-    sheet = Sheet("table17_ladder", {"data": "Scans", "method": "Method"}, rows, columns, intervals)
-    caption = "Registrations of scans that succeed, by the error of the start"
-    footnotes = _notes(run, sheet, intervals, rungs)
-    return sheet.table(caption, "start", footnotes, bold=columns, same=1, keep_empty=True)
 
 
 @table(

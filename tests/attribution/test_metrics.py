@@ -1,12 +1,10 @@
-from itertools import permutations
 from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from gpca.attribution import metrics as m
-from gpca.attribution.metrics import collect, collect_timings, confusion
+from gpca.attribution.metrics import collect, collect_timings, read_uncertainties
 from gpca.attribution.predictions import write_predictions as written_by_the_suite
 from gpca.classifier.scores import Attribution
 from gpca.errors import InputError
@@ -64,24 +62,6 @@ def test_what_the_suite_writes_is_collected(tmp_path):
     assert [value(metrics, name) for name in ("accuracy", "icp_calls")] == [0.5, 3.5]
 
 
-def test_permuted_accuracy_is_the_best_of_all_permutations_and_no_name_helps_a_constant():
-    true = np.array([*["noise"] * 10, *["pose"] * 12, *["overlap"] * 8])
-    turned = np.select([true == "noise", true == "pose"], ["pose", "overlap"], "noise")
-    for predicted, abstained, permuted in (
-        (true, np.zeros(30, bool), 1),
-        (turned, np.zeros(30, bool), 1),
-        (turned, true == "overlap", 22 / 30),  # an abstained sample stays wrong under every name
-    ):
-        assert m.permuted_accuracy(confusion(true, predicted, abstained, CONCEPTS)) == permuted
-    constant = confusion(np.repeat(CONCEPTS, 7), np.repeat("pose", 21), np.zeros(21, bool), CONCEPTS)
-    assert m.permuted_accuracy(constant) == pytest.approx(1 / 3)
-    random = np.random.default_rng(0)
-    for _ in range(20):
-        counts = random.integers(0, 30, (4, 5))
-        best = max(sum(counts[true, named] for true, named in enumerate(order)) for order in permutations(range(4)))
-        assert m.permuted_accuracy(counts) == best / counts.sum()
-
-
 def test_confusion_is_collected_per_true_concept_and_sums_to_its_samples(tmp_path):
     abstained = [False, False, True, False, False]
     path = write_predictions(tmp_path / "ycb" / "gpca" / "seed0.csv", abstained=abstained, icp_calls=[0, 0, 5, 5, 10])
@@ -93,48 +73,19 @@ def test_confusion_is_collected_per_true_concept_and_sums_to_its_samples(tmp_pat
         assert tuple(value(metrics, name, concept) for name in names) == counts
         assert sum(counts) == value(metrics, "test_samples", concept)
     assert value(metrics, "icp_calls") == 4
-    assert value(metrics, "permuted_accuracy") == value(metrics, "accuracy") == 2 / 5
 
 
-def causal_file(path, observed, clean, **columns):
+def uncertainty_file(path, observed, clean, **columns):
     rows = {"sample": range(len(observed)), "split": "test", "uncertainty_observed": observed}
     path.parent.mkdir(parents=True, exist_ok=True)
     pd.DataFrame(rows | {"uncertainty_clean": clean} | columns).to_csv(path, index=False)
     return path
 
 
-def test_causal_is_above_the_95th_percentile_of_the_clean(tmp_path):
-    clean = np.arange(101.0)  # its 95th percentile is 95
-    observed = np.array([95.0, 95.1, *np.zeros(98), 1000.0])
-    causal = m.read_causal(causal_file(tmp_path / "seed0.csv", observed, np.random.default_rng(0).permutation(clean)))
-    assert np.flatnonzero(causal).tolist() == [1, 100]
-    assert causal["test", "100"]
-
-
-def test_causal_metrics_are_of_the_causal_samples_of_the_same_source_and_seed(tmp_path):
-    files = [write_predictions(tmp_path / "ycb" / "gpca" / f"seed{seed}.csv") for seed in (0, 1, 2)]
-    files.append(write_predictions(tmp_path / "cat" / "gpca" / "seed0.csv"))
-    place = tmp_path / "uncertainty" / "ycb" / "causal"
-    # PREDICTED is right at 0, 2 and 3.
-    causal = [
-        causal_file(place / "seed0.csv", [9, 9, 9, 0, 0], [0, 0, 0, 1, 1]),
-        causal_file(place / "seed1.csv", [0, 0, 0, 0, 0], [1, 1, 1, 1, 1]),
-    ]
-    metrics = collect(files, causal)
-    assert [value(metrics, f"causal_{name}") for name in ("samples", "accuracy")] == [3, 2 / 3]
-    assert value(metrics, "causal_samples", seed=1) == 0
-    of_causal = metrics[metrics["metric"].str.startswith("causal")]
-    assert set(zip(of_causal["source"], of_causal["seed"], strict=True)) == {("ycb", 0), ("ycb", 1)}
-    assert "causal_accuracy" not in set(of_causal.loc[of_causal["seed"] == 1, "metric"])
-    assert not collect(files)["metric"].str.startswith("causal").any()
-
-
-def test_an_explainer_of_a_subset_is_judged_on_it(tmp_path):
-    path = write_predictions(tmp_path / "ycb" / "sa" / "seed0.csv", sample=[4, 0, 7, 3, 9])
-    causal = causal_file(tmp_path / "ycb" / "causal" / "seed0.csv", [9, 0, 0, 0, 9, 9, 9, 9, 0, 0], np.arange(10) / 5)
-    metrics = collect([path], [causal])
-    # The causal ones are 4, 0 and 7: right, wrong, right.
-    assert [value(metrics, name) for name in ("test_samples", "causal_samples", "causal_accuracy")] == [5, 3, 2 / 3]
+def test_the_limit_of_uncertainties_is_the_95th_percentile_of_the_clean(tmp_path):
+    path = uncertainty_file(tmp_path / "seed0.csv", [95.0, *np.zeros(99), 1000.0], np.arange(101.0))
+    observed, limit = read_uncertainties(path)
+    assert limit == 95 and observed["test", "100"] == 1000
 
 
 @pytest.mark.parametrize(
@@ -144,16 +95,13 @@ def test_an_explainer_of_a_subset_is_judged_on_it(tmp_path):
         ({"uncertainty_observed": np.inf}, "'uncertainty_observed' contains values that are not finite numbers"),
         ({"sample": 3}, "contains a sample twice"),
         ({"split": "tset"}, "'split'"),
-        ({"sample": [0, 1, 2, 3, 5]}, "lacks test sample 4 of .*gpca/seed0.csv"),
     ],
 )
-def test_a_faulty_causal_file_is_refused_in_one_line(tmp_path, columns, expected):
-    predictions = write_predictions(tmp_path / "ycb" / "gpca" / "seed0.csv")
-    causal = causal_file(tmp_path / "ycb" / "causal" / "seed0.csv", np.ones(5), np.ones(5), **columns)
+def test_a_faulty_file_of_uncertainties_is_refused_in_one_line(tmp_path, columns, expected):
+    path = uncertainty_file(tmp_path / "seed0.csv", np.ones(5), np.ones(5), **columns)
     with pytest.raises(InputError, match=expected) as caught:
-        collect([predictions], [causal])
-    assert str(caught.value).startswith(str(causal))
-    assert "\n" not in str(caught.value)
+        read_uncertainties(path)
+    assert str(caught.value).startswith(str(path)) and "\n" not in str(caught.value)
 
 
 def test_timings_are_means_over_the_test_samples(tmp_path):

@@ -268,14 +268,14 @@ def test_a_config_that_does_not_say_what_agrees_is_named(folders, capsys, tmp_pa
     ("kind", "places"),
     {
         "share": "metrics:accuracy recovery:recovered_within_3 estimators:coverage_starts registration_methods:add "
-        "tables/table12_failures:lead tables/table4_grid:ece tables/table9_causes:nominal_calibration "
+        "tables/table12_failures:lead tables/table9_causes:nominal_calibration "
         "tables/table5_learners:ece tables/table5_shift:ece_severity",
         "count": "metrics:predicted_as_pose active_learning:labels_to_target recovery:first_queue "
         "tables/table8_recovery:actions tables/table10_controls:paper_auroc_wrong",
         "correlation": "diagnostics:rho_max_score_knn_analytical_low tables/table12_failures:spearman_error "
         "tables/table5_learners:rho",
         "nats": "diagnostics:nll kernels:elbo estimators:kl_rotation_data estimators:nees_truth",
-        "percent": "tables/table12_uncertainty:coverage tables/table11_severity:pose_low "
+        "percent": "tables/table12_uncertainty:coverage tables/table11_registration:pose_low "
         "tables/table1_single_baselines:gpca_paper",
         "degrees": "registration_methods:rotation_deg tables/table11_registration:rotation_deg",
     }.items(),

@@ -4,7 +4,7 @@ import json
 from types import SimpleNamespace
 
 from gpca.declarations.plan import Run
-from gpca.declarations.step import Plan, Step, all_files, rules_of
+from gpca.declarations.step import Plan, Step, all_files, rule_of
 
 NAMES = {
     "source": ["ycb", "cups"],
@@ -36,7 +36,7 @@ def step(**changes):
 
 
 def test_wildcards_have_a_job_each_and_lists_one_for_all():
-    [rule] = rules_of(step(), PLAN)
+    rule = rule_of(step(), PLAN)
     assert rule.inputs == {
         "objects": "objects/{source}.npz",
         "pairs": ["pairs/{source}/seed0.npz", "pairs/{source}/seed1.npz"],
@@ -58,7 +58,7 @@ def test_a_name_may_stand_for_the_values_of_another_and_a_single_value_is_filled
         outputs={"out": "out/{frames}/{source}.csv"},
         where={"source": "trained"},
     )
-    [rule] = rules_of(other, PLAN)
+    rule = rule_of(other, PLAN)
     assert rule.inputs["frames"] == "frames/real_rgbd.npz"
     assert (rule.outputs["out"], rule.constraints) == ("out/real_rgbd/{source}.csv", {"source": "cups"})
     assert all_files(other, PLAN) == ["out/real_rgbd/cups.csv"]
@@ -71,7 +71,7 @@ def test_functions_are_asked_for_every_job():
         params={"title": lambda plan, wildcards: wildcards.source.upper(), "fixed": 3},
         modules_of_job=lambda plan, wildcards: ["gpca.portable"] if wildcards.source == "ycb" else [],
     )
-    [rule] = rules_of(dynamic, PLAN)
+    rule = rule_of(dynamic, PLAN)
     job = Wildcards(source="ycb")
     assert rule.inputs["others"](job) == ["objects/ycb.npz", "objects/cups.npz"]
     assert json.loads(rule.settings(job)) == {"seed": "ycb"}
@@ -79,33 +79,12 @@ def test_functions_are_asked_for_every_job():
     assert [("gpca.portable" in rule.modules(Wildcards(source=name))) for name in ("ycb", "cups")] == [True, False]
 
 
-def test_names_from_outside_have_jobs_of_their_own():
-    apart = step(
-        apart=("method", lambda plan: ["mine"]),
-        settings=lambda plan, wildcards: {"methods": plan.names["method"]},
-        modules=lambda plan: ["gpca.portable"] if "mine" in plan.names["method"] else [],
-    )
-    inside, outside = rules_of(apart, PLAN)
-    assert inside.params["methods"] == ["icp", "fgr"] and "gpca.portable" not in inside.modules
-    job = Wildcards(source="ycb", outside_method="mine")
-    assert outside.outputs["rows"] == [f"methods/{{source}}/{{outside_method}}/seed{seed}.csv" for seed in (0, 1)]
-    assert outside.constraints["outside_method"] == "mine"
-    assert outside.params["methods"](job) == ["mine"]
-    assert json.loads(outside.settings(job)) == {"methods": ["mine"]}
-    assert "gpca.portable" in outside.modules(job)
-    assert rules_of(step(apart=("method", lambda plan: [])), PLAN)[1].constraints["outside_method"] == "none"
-
-
 def test_lists_have_the_plural_of_their_name():
-    [rule] = rules_of(step(outputs={"out": "curves/{*strategy}.csv"}, where={"strategy": "method"}), PLAN)
+    rule = rule_of(step(outputs={"out": "curves/{*strategy}.csv"}, where={"strategy": "method"}), PLAN)
     assert rule.params["strategies"] == NAMES["method"]
 
 
-def test_a_step_that_a_run_does_without_has_no_rule():
-    assert rules_of(step(when=lambda plan: False), PLAN) == []
-
-
 def test_data_comes_from_outside_the_run():
-    [rule] = rules_of(step(data=lambda plan, wildcards: [f"data/{wildcards.source}.ply"]), PLAN)
+    rule = rule_of(step(data=lambda plan, wildcards: [f"data/{wildcards.source}.ply"]), PLAN)
     assert rule.data["data"](Wildcards(source="ycb")) == ["data/ycb.ply"]
-    assert rules_of(step(), PLAN)[0].data == {}
+    assert rule_of(step(), PLAN).data == {}

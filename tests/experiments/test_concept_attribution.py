@@ -40,33 +40,24 @@ def predictions(seed):
 
 @pytest.fixture
 def files(tmp_path):
-    given, causal = [], []
+    given = []
     for seed in range(2):
         given.append(tmp_path / f"predictions/ycb/gpca/seed{seed}.csv")
         write_csv(given[-1], predictions(seed))
-        causal.append(tmp_path / f"uncertainty/ycb/causal/seed{seed}.csv")
-        rows = predictions(seed)[["sample", "split"]]
-        observed = np.where(rows["sample"] % 2 == 0, 2.0, 0.0)
-        write_csv(causal[-1], rows.assign(uncertainty_observed=observed, uncertainty_clean=1.0))
-    return given, causal
+    return given
 
 
 @pytest.fixture
 def collected(files, tmp_path):
-    write_csv(tmp_path / "intervals.csv", collect_intervals(*files), form=None)
+    write_csv(tmp_path / "intervals.csv", collect_intervals(files), form=None)
     return read_clustered(tmp_path / "intervals.csv").set_index(["metric", "concept"])
 
 
 def test_values_are_those_of_the_metrics_with_intervals_over_families_and_seeds(files, collected):
-    metrics = collect(*files).groupby(["metric", "concept"])["value"].mean()
-    assert set(collected.index) == {
-        *(("accuracy", concept) for concept in ("all", *CONCEPTS)),
-        ("permuted_accuracy", "all"),
-        ("causal_accuracy", "all"),
-    }
+    metrics = collect(files).groupby(["metric", "concept"])["value"].mean()
+    assert set(collected.index) == {("accuracy", concept) for concept in ("all", *CONCEPTS)}
     for key in collected.index:
         assert collected.loc[key, "value"] == pytest.approx(metrics[key])
-    assert collected.loc[("causal_accuracy", "all"), "samples"] == 24
     row = collected.loc["accuracy", "all"]
     assert (row["seeds"], row["clusters"], row["samples"]) == (2, 4, 48)
     assert row["high"] - row["low"] > 1.5 * np.ptp(wilson_interval(30, 48))  # far more than of independent samples
@@ -74,15 +65,11 @@ def test_values_are_those_of_the_metrics_with_intervals_over_families_and_seeds(
 
 
 def test_faults_are_one_line(files):
-    given, causal = files
     with pytest.raises(InputError, match="no files were given"):
         collect_intervals([])
-    write_csv(causal[0], pd.read_csv(causal[0]).iloc[3:])
-    with pytest.raises(InputError, match="lacks samples of"):
-        collect_intervals(given, causal)
-    write_csv(given[1], predictions(1).iloc[-1:])
+    write_csv(files[1], predictions(1).iloc[-1:])
     with pytest.raises(InputError, match="has no test rows"):
-        collect_intervals(given)
+        collect_intervals(files)
 
 
 REAL = {"linemod": {"title": "LINEMOD", "stand_in": False}, "ycb": {"title": "YCB", "stand_in": False}}
@@ -194,19 +181,13 @@ def test_ties_at_the_printed_precision_are_all_bold_unless_most_of_a_large_group
 
 def full(source, explainer, accuracy, **metrics):
     """Intervals and metrics of one explainer as the collectors make them, the metrics the same over seeds."""
-    given = {"permuted_accuracy": 0.9, "abstention_rate": 0.125, "icp_calls": 400.0, "seconds_per_sample": 0.25}
-    given |= {"test_samples": 200.0, "causal_samples": 80.0, "causal_accuracy": 0.5} | metrics
-    counts = {"accuracy": "test_samples", "permuted_accuracy": "test_samples", "causal_accuracy": "causal_samples"}
-    intervals = []
-    for metric, counted in counts.items():
-        value = accuracy if metric == "accuracy" else given[metric]
-        own = ("attribution", source, explainer, metric, "all", 3, 11, int(3 * given[counted]))
-        intervals.append((*own, value, value - 0.03, value + 0.02))
+    given = {"abstention_rate": 0.125, "icp_calls": 400.0, "seconds_per_sample": 0.25, "test_samples": 200.0} | metrics
+    own = ("attribution", source, explainer, "accuracy", "all", 3, 11, int(3 * given["test_samples"]))
+    intervals = [(*own, accuracy, accuracy - 0.03, accuracy + 0.02)]
     records = [
         ("attribution", source, explainer, metric, "all", seed, value)
         for seed in range(3)
         for metric, value in given.items()
-        if metric not in counts
     ]
     return pd.DataFrame(intervals, columns=list(COLUMNS)), pd.DataFrame(records, columns=list(TIDY_COLUMNS))
 
@@ -215,7 +196,7 @@ def full(source, explainer, accuracy, **metrics):
 def everything():
     parts = [
         full("ycb", "gpca", 0.9, icp_calls=0.0, seconds_per_sample=0.0204),
-        full("ycb", "shap_additive", 0.35, test_samples=60.0, causal_samples=21.0),
+        full("ycb", "shap_additive", 0.35, test_samples=60.0),
         full("ycb", "shap_oracle", 0.97),
         full("linemod", "gpca", 0.8),
     ]
@@ -225,28 +206,19 @@ def everything():
 def test_extended_has_a_row_per_explainer_and_a_unit_per_column(everything):
     table = made(table1_extended, *everything)
     lines = table.markdown().splitlines()
-    assert lines[2] == (
-        "| Dataset | Explainer | Reads | Accuracy (%) | Relabeled (%) | Causal (%) | n causal "
-        "| Abstained (%) | ICP calls | Seconds | n |"
-    )
-    constant = "90.0 (87.0 to 92.0) | 50.0 (47.0 to 52.0) | 80 | 12.5"
+    assert lines[2] == "| Dataset | Explainer | Reads | Accuracy (%) | Abstained (%) | ICP calls | Seconds | n |"
+    constant = "12.5"
     assert lines[4] == f"| LINEMOD | {GPCA} | aligned source | 80.0 (77.0 to 82.0) | {constant} | 400 | 0.250 | 200 |"
     assert lines[5] == f"| YCB | {GPCA} | aligned source | **90.0 (87.0 to 92.0)** | {constant} | 0 | 0.020 | 200 |"
     assert lines[6].startswith("| YCB | SHAP | further runs | 35.0 (32.0 to 37.0) |")
-    assert lines[6].endswith("| 21 | 12.5 | 400 | 0.250 | 60 |")
+    assert lines[6].endswith("| 12.5 | 400 | 0.250 | 60 |")
     assert "60 to 200 test samples each" in table.footnotes[0]
     assert "the one column that differs from run to run" in table.markdown()
 
 
-def test_extended_leaves_out_few_causal_samples_and_what_was_not_measured(everything):
-    intervals, metrics = everything
-    few = intervals.assign(samples=29)
-    assert (1, "causal_accuracy") in made(table1_extended, intervals, metrics).cells
-    assert (1, "causal_accuracy") not in made(table1_extended, few, metrics).cells
-    parts = (part[~part["metric"].str.startswith(("causal", "seconds"))] for part in everything)
-    markdown = made(table1_extended, *parts).markdown()
-    assert "Causal" not in markdown
-    assert "Seconds" not in markdown
+def test_extended_leaves_out_what_was_not_measured(everything):
+    parts = (part[part["metric"] != "seconds_per_sample"] for part in everything)
+    assert "Seconds" not in made(table1_extended, *parts).markdown()
 
 
 def test_extended_sets_the_best_rival_in_bold_never_an_oracle_and_has_a_line_per_number(everything):
@@ -259,8 +231,7 @@ def test_extended_sets_the_best_rival_in_bold_never_an_oracle_and_has_a_line_per
     records = made(table1_extended, *everything).records()
     heads = ("metric", "mean", "ci_low", "ci_high", "n_seeds", "n_test", "at_least")
     assert records[0] == ("source", "explainer", "reads", *heads)
-    assert len(records) == 1 + 4 * 8
+    assert len(records) == 1 + 4 * 5
     assert ("ycb", "gpca", "aligned source", "seconds_per_sample", 0.0204, 0.0204, 0.0204, 3, 600, False) in records
-    assert ("ycb", "shap_additive", "further runs", "causal_accuracy", 50.0, 47.0, 52.0, 3, 63, False) in records
     assert ("ycb", "shap_additive", "further runs", "accuracy", 35.0, 32.0, 37.0, 3, 180, False) in records
     assert ("ycb", "gpca", "aligned source", "icp_calls", 0.0, 0.0, 0.0, 3, 600, False) in records

@@ -12,7 +12,6 @@ from gpca.experiments.recovery_measures import (
     collect_differences,
     collect_intervals,
     policy_metrics,
-    pool_share,
     read_recovery,
 )
 from gpca.io.csv_file import write_csv
@@ -68,34 +67,20 @@ def files(tmp_path):
 
 
 def test_the_metrics_of_a_policy_by_hand():
-    values = policy_metrics(rows_of(*EPISODES), TREATMENTS, COSTS, 3)
+    values = policy_metrics(rows_of(*EPISODES), COSTS, 3)
     assert [values[f"recovered_within_{k}"] for k in (1, 2, 3)] == [0.25, 0.5, 0.5]
-    assert values["wrong_first"] == pytest.approx(2 / 3)  # of the three that acted
     assert values["queued"] == 0.25
-    assert values["actions"] == 6 / 4
     assert values["cost"] == pytest.approx((3 * 0.02 + 2 * 0.01 + 0.03) / 4)
     assert values["episodes"] == 4
     assert values["tries"] == 60
-    assert [values[f"first_{a}"] for a in ("denoise", "reinitialize", "new_view", QUEUE)] == [1, 1, 1, 1]
 
 
 def test_what_did_not_fail_counts_apart():
     fine = rows_of(("noise", ["denoise"], False), ("pose", [NOTHING], False)).assign(failed=False)
-    values = policy_metrics(pd.concat([rows_of(*EPISODES), fine]), TREATMENTS, COSTS, 3)
+    values = policy_metrics(pd.concat([rows_of(*EPISODES), fine]), COSTS, 3)
     assert (values["nominal"], values["acted_nominal"], values["episodes"]) == (2, 0.5, 4)
-    assert values["cost_nominal"] == pytest.approx(0.02 / 2)
-    left = policy_metrics(rows_of(("pose", [NOTHING], False)), TREATMENTS, COSTS, 3)
+    left = policy_metrics(rows_of(("pose", [NOTHING], False)), COSTS, 3)
     assert (left["left_alone"], left["queued"], left["recovered_within_3"]) == (1, 0, 0)
-
-
-def test_shares_are_pooled_over_the_failures_of_all_seeds(files):
-    metrics = collect(run_of(), files)
-    assert pool_share(metrics, "gpca", "recovered_within_1") == (pytest.approx(3 / 6), 6)
-    assert pool_share(metrics, "gpca", "recovered_within_2", "noise") == (pytest.approx(1), 4)
-    assert pool_share(metrics, "gpca", "recovered_within_2", "pose") == (0, 1)
-    assert pool_share(metrics, "gpca", "wrong_first") == (pytest.approx(2 / 5), 5)
-    assert pool_share(metrics, "random", "recovered_within_1") is None
-    assert "wrong_first" not in set(metrics[metrics["concept"] == "overlap"]["metric"])  # none of them acted
 
 
 def test_faulty_files_are_refused(files, tmp_path):
@@ -147,9 +132,13 @@ def shares(taken_files, tmp_path):
 def test_shares_are_those_of_the_metrics(taken_files, shares):
     metrics = collect(run_of(budget=2), taken_files)
     for policy, metric, concept in shares.index:
-        share, samples = pool_share(metrics, policy, metric, concept)
+        wide = metrics.query("method == @policy and concept == @concept").pivot(
+            index="seed", columns="metric", values="value"
+        )
+        count_R = wide["nominal" if metric == "acted_nominal" else "episodes"]
         row = shares.loc[policy, metric, concept]
-        assert (row["value"], row["samples"]) == (pytest.approx(share), samples)
+        assert row["value"] == pytest.approx((wide[metric] * count_R).sum() / count_R.sum())
+        assert row["samples"] == count_R.sum()
     assert {metric for _, metric, _ in shares.index} == {
         "recovered_within_1", "recovered_within_2", "queued", "left_alone", "acted_nominal",
     }  # fmt: skip

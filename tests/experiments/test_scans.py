@@ -12,7 +12,6 @@ from gpca.experiments.scans import (
     check,
     collect,
     names,
-    table17_ladder,
     table17_published,
     table17_scans,
     titles_of_scans,
@@ -154,11 +153,11 @@ def test_tables_have_a_row_for_each_start_and_method(intervals, tmp_path, monkey
     given = run_of().config["methods"]
     left_out = {"kiss_matcher": "kiss"}
     monkeypatch.setattr(registration_methods.registry, "left_out", lambda names: left_out if names == given else {})
-    by_start = table17_ladder(run_of(), intervals)
-    assert [labels[1][0] for labels in by_start.rows] == ["gicp"]
-    assert by_start.cells[0, "20deg_0.5m"].mean == pytest.approx(200 / 3)
-    assert "KISS-Matcher needs the package kiss" in by_start.markdown()
-    assert "20°, 0.5 m (%)" in by_start.markdown()
+    table = table17_scans(run_of(), intervals, seconds(tmp_path))
+    assert [row for row, key in table.cells if key == "20deg_0.5m"] == [0]
+    assert table.cells[0, "20deg_0.5m"].mean == pytest.approx(200 / 3)
+    assert "KISS-Matcher needs the package kiss" in table.markdown()
+    assert "From 20°, 0.5 m (%)" in table.markdown()
 
 
 def test_published_recalls_stand_beside_those_of_the_run(intervals, tmp_path):

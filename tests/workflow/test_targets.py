@@ -64,7 +64,7 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
     ),
     "gpca/steps/shift.py": ("shifted/ learners/ table5_shift", "predictions active_learning diagnoses/ model.pt"),
     "gpca/experiments/kernel_grid.py": (
-        "figures/kernel_learning_curves kernels.csv table4_grid",
+        "figures/kernel_learning_curves kernels.csv table4_kernels",
         "kernels/ figures/fig3",
     ),
     "gpca/active_learning/acquisition.py": (

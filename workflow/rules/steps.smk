@@ -1,6 +1,6 @@
 # The steps that experiments declare: a rule for each, of one shape, and a target for all its files.
 from gpca.declarations.registry import steps
-from gpca.declarations.step import all_files, rules_of
+from gpca.declarations.step import all_files, rule_of
 
 if workflow.is_main_process:
     for experiment in experiments():
@@ -18,7 +18,8 @@ for step in steps():
                 if step.when(PLAN)
                 else [],
 
-    for made in rules_of(step, PLAN):
+    if step.when(PLAN):
+        made = rule_of(step, PLAN)
 
         rule:
             name:

@@ -1,11 +1,10 @@
 """Builds a table row by row: it knows which rows have cells, which compete for bold, and what all tables say below."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import product
 
 from gpca.errors import InputError
 from gpca.evaluation.intervals import REPEATS
-from gpca.objects.entry import stand_in_clause
 from gpca.reporting.tables.cells import share_within_limits
 from gpca.reporting.tables.table import LEAST_SEEDS, Cell, Column, Table
 from gpca.reporting.words import plural
@@ -56,12 +55,6 @@ class TableBuilder:
             fault = "has nothing to show: its files hold no numbers of what the config names"
             raise InputError(f"table '{self.name}'", fault, "run that first")
 
-    def stand_in_clause(self, sources: Mapping[str, Mapping], partly: bool = True) -> str:
-        """Return the caption's clause on stand-ins among the sources that name the rows."""
-        self.require_rows()
-        names = dict.fromkeys(labels[0][0] for labels in self.labels)
-        return stand_in_clause((sources[name] for name in names), partly)
-
     def most_seeds(self) -> int:
         """Return over how many seeds the cell with the most of them is a mean."""
         self.require_rows()
@@ -83,12 +76,6 @@ class TableBuilder:
             footnotes=(*footnotes, *((NEAR_LIMITS,) if widened else ())),
             compared=tuple(self._compared),
         )
-
-
-def crossed(*titles: Mapping[str, str]) -> Iterator[tuple[tuple[str, ...], list[Label]]]:
-    """Yield the keys and the labels of every row of a table that crosses names, given the title of each."""
-    for labels in product(*(named.items() for named in titles)):
-        yield tuple(key for key, _ in labels), list(labels)
 
 
 # Starts of footnotes, without a full stop. Numbers of samples are of each seed.

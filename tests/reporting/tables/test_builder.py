@@ -77,14 +77,6 @@ def test_a_table_without_rows_is_refused_by_its_name(use):
         use(TableBuilder("table0", HEADS))
 
 
-def test_the_caption_speaks_of_the_stand_ins_among_the_rows(builder):
-    clause = "procedural stand-ins for the datasets' objects"
-    assert builder.stand_in_clause(SOURCES) == f", measured partly on {clause}"
-    assert builder.stand_in_clause(SOURCES, partly=False) == f", measured on {clause}"
-    others = SOURCES | {"ycb": SOURCES["linemod"], "absent": SOURCES["ycb"]}
-    assert builder.stand_in_clause(others) == ""
-
-
 def test_a_cell_of_repeats_has_their_mean_and_from_three_on_their_t_interval():
     cell = cell_of_repeats([97.0, 98.0, 99.0], 600)
     assert (cell.mean, cell.seeds, cell.test_samples, cell.at_least) == (98, 3, 600, False)
