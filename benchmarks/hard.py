@@ -22,7 +22,7 @@ sys.path.insert(0, str(ROOT))
 
 from gpca.process.processor import prepare  # noqa: E402
 
-PENALTY = 0.1  # inverse regularization
+PENALTY = 1.0  # inverse regularization
 FOLDS = 5
 
 
