@@ -132,7 +132,7 @@ def test_every_subset_of_the_causes_is_drawn():
 
 
 CONFIG = with_defaults()
-FEWER = {"train": 30, "test": 12, "clean_pairs": 20, "points": (128, 256)}
+FEWER = {"train": 12, "test": 6, "clean_pairs": 20, "points": (128, 256)}
 LIMITS = {"nominal": 0.02, "failed": 0.03}
 CAUSES = CONFIG["causes"] | {"limits": LIMITS, "shares": CONFIG["controls"]["hard"]["shares"]}
 
