@@ -7,10 +7,7 @@ from typing import Any
 from gpca.active_learning.acquisition import STREAMS, require_strategy, strategies, strategy_module
 from gpca.active_learning.curves import TABLE, collect_curves
 from gpca.active_learning.settings import LOOK_EVERY, ActiveLearningSettings, RareSettings, StreamSettings, rare_setting
-from gpca.declarations.experiment import Experiment, LeftOut, Names
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Figure, Frame, Paths, figure, numbers, table
-from gpca.declarations.step import Plan, Step
+from gpca.declarations import Experiment, Figure, Frame, LeftOut, Names, Paths, Plan, Run, Step, figure, numbers, table
 from gpca.encoders.registry import EncoderChanges, require_draws
 from gpca.errors import require_names
 from gpca.experiments.label_curves import (
@@ -24,10 +21,8 @@ from gpca.experiments.label_curves import (
     quantity,
 )
 from gpca.pairs.perturbation import Concept
-from gpca.reporting.sheet import Row, Sheet, Show, crossed
+from gpca.reporting.sheet import Row, Sheet, Show, Table, crossed, plural
 from gpca.reporting.tables.builder import cautious_over
-from gpca.reporting.tables.table import Table
-from gpca.reporting.words import plural
 from gpca.settings import Distinct, PositiveShare
 
 NAME = "active_learning"

@@ -11,7 +11,7 @@ from gpca.causes.candidate import replay
 from gpca.causes.dataset import LABELS, Causes
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import ALL, BY_SIZE, FAILED, SUBSETS, shapley_values
-from gpca.declarations.result import Figure, Paths
+from gpca.declarations import Figure, Paths
 from gpca.errors import InputError
 from gpca.evaluation.measures import source_method_seed
 from gpca.objects.canonical import ObjectClouds

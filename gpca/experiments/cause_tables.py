@@ -8,8 +8,7 @@ from typing import Any
 
 from gpca.causes.judged import CEILING
 from gpca.causes.settings import CauseSettings
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Frame, figure, table
+from gpca.declarations import Frame, Run, figure, table
 from gpca.evaluation.intervals import REPEATS
 from gpca.evaluation.measures import POOLED
 from gpca.experiments.cause_figures import draw_causes_example, draw_failures
@@ -19,9 +18,8 @@ from gpca.experiments.leads import lead
 from gpca.explainers.interface import WORDS
 from gpca.objects.entry import dataset_of
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.sheet import Row, Sheet, crossed, show, where, with_label
+from gpca.reporting.sheet import Cell, Column, Row, Sheet, crossed, show, where, with_label
 from gpca.reporting.tables.cells import interval_cell, plain_cell, rows_where
-from gpca.reporting.tables.table import Cell, Column
 from gpca.reporting.words import plural
 
 NEAR = 10  # points above chance up to which the untrained rule is near it

@@ -5,9 +5,7 @@ from typing import Any
 
 from gpca.comparison.claims import claims as table_of_claims
 from gpca.comparison.claims import read_verdicts
-from gpca.declarations.experiment import Experiment
-from gpca.declarations.plan import Run
-from gpca.declarations.result import table
+from gpca.declarations import Experiment, Run, table
 from gpca.experiments.active_learning import titles
 from gpca.experiments.frames import frames_of
 from gpca.experiments.out_of_distribution import learner_titles

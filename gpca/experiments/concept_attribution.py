@@ -8,18 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from gpca.attribution.predictions import concepts_of, read_predictions
-from gpca.declarations.experiment import Experiment, Tidy
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Frame, Paths, table
+from gpca.declarations import Experiment, Frame, Paths, Run, Tidy, table
 from gpca.errors import InputError
 from gpca.evaluation.intervals import Clustered
 from gpca.evaluation.measures import ALL, Measure, by_value, over_seeds, read_all_metrics, read_samples
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.registry import explainer_entry
-from gpca.reporting.sheet import Row, Sheet, Show, crossed, show, where, with_label
-from gpca.reporting.tables.builder import over_clusters
+from gpca.reporting.sheet import Cell, Column, Row, Sheet, Show, crossed, over_clusters, show, where, with_label
 from gpca.reporting.tables.cells import cell_of_repeats
-from gpca.reporting.tables.table import Cell, Column
 from gpca.reporting.words import span
 
 PREDICTIONS = "predictions/{source}/{explainer}/seed{seed}.csv"

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from gpca.attribution.metrics import ABSTAINED, PREDICTED_AS
-from gpca.declarations.result import Figure, Frame
+from gpca.declarations import Figure, Frame
 from gpca.errors import InputError
 from gpca.reporting.figures.panels import draw_percentages, in_lines, panels
 from gpca.reporting.figures.style import TEXT_WIDTH_IN, write_title

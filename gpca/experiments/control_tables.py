@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Figure, Frame, figure, table
+from gpca.declarations import Figure, Frame, Run, figure, table
 from gpca.errors import InputError
 from gpca.evaluation.intervals import REPEATS
 from gpca.evaluation.measures import ALL, POOLED
@@ -16,9 +15,7 @@ from gpca.experiments.explained import titles
 from gpca.explainers.registry import explainer_entry
 from gpca.reporting.figures import style
 from gpca.reporting.figures.style import SMALL_PT
-from gpca.reporting.sheet import Sheet, Show, crossed, show, with_label
-from gpca.reporting.tables.cells import plain_cell, rows_where
-from gpca.reporting.words import plural, span
+from gpca.reporting.sheet import Sheet, Show, crossed, plain_cell, plural, rows_where, show, span, with_label
 from gpca.steps import control_samples as samples_of
 from gpca.steps.control_samples import HARD, PAPER, TRANSFER, UNSEEN
 

@@ -8,10 +8,7 @@ import numpy as np
 
 from gpca.attribution.predictions import read_predictions
 from gpca.causes.settings import NOT_OF_CAUSES, CauseSettings
-from gpca.declarations.experiment import EXPLAINERS, ByName, Experiment, LeftOut
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Frame, Paths, numbers
-from gpca.declarations.step import Plan, Step, Wildcards
+from gpca.declarations import EXPLAINERS, ByName, Experiment, Frame, LeftOut, Paths, Plan, Run, Step, Wildcards, numbers
 from gpca.errors import InputError, with_key
 from gpca.evaluation.intervals import TRIVIAL, Clustered, best_of, interval, weighted_mean
 from gpca.evaluation.measures import ALL, POOLED, TEST_SAMPLES, intervals, source_method_seed, tidy

@@ -12,10 +12,7 @@ from gpca.causes.dataset import LABELS
 from gpca.causes.judged import CEILING, MEASURES, Judged, counted, joined, measure, read_judged
 from gpca.causes.settings import DescriptorSettings
 from gpca.causes.truth import BORDERLINE
-from gpca.declarations.experiment import ByName, Experiment, LeftOut, Names
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Frame, Paths, numbers
-from gpca.declarations.step import Step, Wildcards
+from gpca.declarations import ByName, Experiment, Frame, LeftOut, Names, Paths, Run, Step, Wildcards, numbers
 from gpca.encoders.registry import NamedEncoder, require_backbone, require_draws
 from gpca.errors import InputError, with_key
 from gpca.evaluation.intervals import ANYTHING, TRIVIAL, Clustered

@@ -6,13 +6,10 @@ from math import inf
 from typing import Any
 
 from gpca.alignment.methods.registry import method_entry
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Frame, table
+from gpca.declarations import Frame, Run, table
 from gpca.evaluation.intervals import REPEATS
 from gpca.experiments import estimators
-from gpca.reporting.sheet import Row, Sheet, crossed, with_label
-from gpca.reporting.tables.cells import interval_cell, plain_cell, rows_where
-from gpca.reporting.tables.table import Cell, Column
+from gpca.reporting.sheet import Cell, Column, Row, Sheet, crossed, interval_cell, plain_cell, rows_where, with_label
 from gpca.reporting.words import plural
 from gpca.uncertainty.estimates import KINDS
 from gpca.uncertainty.estimators.registry import estimator_entry

@@ -8,10 +8,7 @@ import numpy as np
 
 from gpca.alignment.methods.registry import method_module, methods, require_local
 from gpca.causes.judged import ranking
-from gpca.declarations.experiment import ByName, Experiment, LeftOut, Names
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Frame, Paths, Series, numbers
-from gpca.declarations.step import Plan, Step
+from gpca.declarations import ByName, Experiment, Frame, LeftOut, Names, Paths, Plan, Run, Series, Step, numbers
 from gpca.errors import InputError, with_key
 from gpca.evaluation.intervals import Clustered, interval
 from gpca.evaluation.measures import source_method_seed, tidy

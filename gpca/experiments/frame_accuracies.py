@@ -8,8 +8,7 @@ import numpy as np
 from gpca.attribution.diagnostics import brier_score, calibration_error, negative_log_likelihood
 from gpca.attribution.metrics import attribution_metrics
 from gpca.attribution.predictions import concepts_of, read_predictions
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Frame, Paths, numbers
+from gpca.declarations import Frame, Paths, Run, numbers
 from gpca.errors import InputError
 from gpca.evaluation.intervals import Clustered
 from gpca.evaluation.measures import ALL, intervals, source_method_seed, tidy

@@ -12,10 +12,7 @@ from gpca.attribution.predictions import read_predictions
 from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.causes.judged import CEILING, MEASURES, Judged, ceiling_of, joined, judged_by, measure
 from gpca.causes.truth import BORDERLINE, FAILED, GEOMETRY, NOMINAL, Truth
-from gpca.declarations.experiment import Experiment
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Frame, Paths, numbers, table
-from gpca.declarations.step import Plan, Step
+from gpca.declarations import Experiment, Frame, Paths, Plan, Run, Step, numbers, table
 from gpca.encoders.registry import encoder_module
 from gpca.errors import InputError
 from gpca.evaluation.intervals import FEWEST_FAILURES, REPEATS, Clustered, pigeonhole_weights
@@ -32,10 +29,7 @@ from gpca.io.csv_file import ANY, read_csv
 from gpca.objects.canonical import BY_ICP
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.plugins import is_outside
-from gpca.reporting.sheet import Row, Sheet, show, where
-from gpca.reporting.tables.cells import plain_cell
-from gpca.reporting.tables.table import Cell, Column
-from gpca.reporting.words import dataset_in_words, plural
+from gpca.reporting.sheet import Cell, Column, Row, Sheet, dataset_in_words, plain_cell, plural, show, where
 from gpca.seeds import generator, seed_of_file
 
 SAMPLE_COLUMNS = ("sample", "instance", "start", "dataset", "scene", "truth", "missed")

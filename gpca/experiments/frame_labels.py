@@ -5,18 +5,14 @@ from dataclasses import replace
 
 from gpca.active_learning.curves import TABLE, collect_curves
 from gpca.active_learning.settings import ALL_LABELS, FRAME_STRATEGIES, PAIR, FrameLabelSettings
-from gpca.declarations.experiment import Experiment, LeftOut
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Frame, Paths, table
-from gpca.declarations.step import Step
+from gpca.declarations import Experiment, Frame, LeftOut, Paths, Run, Step, table
 from gpca.errors import InputError, require_names
 from gpca.experiments.frames import encoder_title, title_of_frames
 from gpca.experiments.label_curves import COUNT, label_cells, quantity
 from gpca.frames.source import REAL_WORLD
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.sheet import Sheet, Show, crossed
+from gpca.reporting.sheet import Sheet, Show, Table, crossed
 from gpca.reporting.tables.builder import mean_over
-from gpca.reporting.tables.table import Table
 
 TO_TARGET = ("labels_to_target", "epochs_to_target", "reached")  # metrics that differ by target accuracy
 ONE_TARGET = "epochs_at_target"  # left out, because there are several targets

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 
 from gpca.attribution.predictions import read_predictions
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Figure, Frame, figure
+from gpca.declarations import Figure, Frame, Run, figure
 from gpca.errors import InputError
 from gpca.experiments.confusions import draw_confusions
 from gpca.experiments.frames import encoder_title, read_together, title_of_frames

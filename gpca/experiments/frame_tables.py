@@ -3,8 +3,7 @@
 from math import inf
 from typing import Any
 
-from gpca.declarations.plan import Run
-from gpca.declarations.result import table
+from gpca.declarations import Run, table
 from gpca.encoders.registry import make_encoder, parameter_count
 from gpca.evaluation.intervals import TRIVIAL
 from gpca.evaluation.measures import ALL
@@ -15,9 +14,7 @@ from gpca.experiments.frames import CLASSIC, REDUCTIONS, TOGETHER, title_of_fram
 from gpca.explainers.registry import explainer_entry
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD, conditions_of
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.sheet import Row, Sheet, crossed, show, where
-from gpca.reporting.tables.cells import cell_of_repeats, plain_cell
-from gpca.reporting.tables.table import Column
+from gpca.reporting.sheet import Column, Row, Sheet, cell_of_repeats, crossed, plain_cell, show, where
 from gpca.reporting.words import dataset_in_words, plural
 
 PUBLISHED_NOTE = "readings of which architecture the paper used; they are not compared with what it prints."

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from gpca.declarations.result import Frame
+from gpca.declarations import Frame
 from gpca.evaluation.measures import read_metrics
 from gpca.frames.source import REAL_WORLD, resolve_datasets
 from gpca.objects.entry import title_of

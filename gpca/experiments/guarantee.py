@@ -9,10 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from gpca.declarations.experiment import Experiment, LeftOut
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Frame, Paths, figure, numbers, table
-from gpca.declarations.step import Step
+from gpca.declarations import Experiment, Frame, LeftOut, Paths, Run, Step, figure, numbers, table
 from gpca.errors import InputError
 from gpca.evaluation.intervals import interval, pigeonhole_weights
 from gpca.evaluation.measures import ALL, POOLED

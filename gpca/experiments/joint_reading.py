@@ -10,10 +10,7 @@ from gpca.comparison.joint_reading import DEVELOPMENT, EVALUATED, EVALUATION, JU
 from gpca.comparison.published import read_published
 from gpca.comparison.readings import read_judged
 from gpca.comparison.verdicts import Tolerance
-from gpca.declarations.experiment import Experiment, LeftOut
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Frame, Paths, numbers, table
-from gpca.declarations.step import Plan, Step
+from gpca.declarations import Experiment, Frame, LeftOut, Paths, Plan, Run, Step, numbers, table
 from gpca.errors import InputError
 from gpca.evaluation.measures import read_all_metrics, read_metrics, tidy
 from gpca.experiments import reading_words
@@ -23,8 +20,7 @@ from gpca.experiments.specification_curve import plain_cells, plain_column, stan
 from gpca.explainers.registry import explainer_module
 from gpca.io.csv_file import ANY, read_csv
 from gpca.objects.entry import Name, SourceEntry, title_of
-from gpca.reporting.tables.builder import TableBuilder
-from gpca.reporting.tables.cells import rows_where
+from gpca.reporting.sheet import TableBuilder, rows_where
 from gpca.settings import Bounds, Count
 
 DevelopmentSeed = Annotated[int, Bounds(minimum=100)]  # no other run has them

@@ -6,10 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from gpca.attribution.predictions import read_predictions
-from gpca.declarations.experiment import Experiment
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Figure, Frame, Paths, figure, numbers, table
-from gpca.declarations.step import Step
+from gpca.declarations import Experiment, Figure, Frame, Paths, Run, Step, figure, numbers, table
 from gpca.errors import InputError
 from gpca.evaluation.intervals import Clustered
 from gpca.evaluation.measures import ALL, intervals, read_samples, tidy

@@ -8,17 +8,15 @@ from typing import Any
 import numpy as np
 
 from gpca.active_learning.curves import CENSORED_BY, read_curves
-from gpca.declarations.result import Figure, Frame, Paths
+from gpca.declarations import Figure, Frame, Paths
 from gpca.errors import InputError
 from gpca.evaluation.intervals import mean_interval
 from gpca.evaluation.measures import source_method_seed
 from gpca.pairs.dataset import Registrations
 from gpca.reporting.figures import style
 from gpca.reporting.figures.panels import fitting_columns, legend_below, panels
-from gpca.reporting.sheet import Show
-from gpca.reporting.tables.cells import cautious_cell, cell_of_repeats, where
-from gpca.reporting.tables.table import Cell
-from gpca.reporting.words import plural, span
+from gpca.reporting.sheet import Cell, Show, cell_of_repeats, plural, span, where
+from gpca.reporting.tables.cells import cautious_cell
 from gpca.seeds import seed_of_file
 
 MOST_LINES = 6  # in a panel; of more, none can be followed

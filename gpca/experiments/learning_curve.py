@@ -4,10 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from gpca.causes.judged import CEILING
-from gpca.declarations.experiment import Experiment, LeftOut
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Frame, Paths, figure, numbers
-from gpca.declarations.step import Step
+from gpca.declarations import Experiment, Frame, LeftOut, Paths, Run, Step, figure, numbers
 from gpca.errors import InputError
 from gpca.evaluation.measures import read_samples, tidy
 from gpca.experiments.diagnosis import FURTHER

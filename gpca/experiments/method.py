@@ -6,9 +6,7 @@ from typing import Any
 import numpy as np
 
 from gpca.causes.policy import NOTHING, QUEUE, Decision, RecoveryPolicy
-from gpca.declarations.experiment import Experiment
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Figure, figure
+from gpca.declarations import Experiment, Figure, Run, figure
 from gpca.errors import InputError
 from gpca.evaluation.intervals import mean_ranks
 from gpca.experiments import registration_stages as stages_of

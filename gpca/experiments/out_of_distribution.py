@@ -9,10 +9,7 @@ import numpy as np
 
 from gpca.attribution import diagnostics
 from gpca.attribution import learner_predictions as predicted
-from gpca.declarations.experiment import ByName, Experiment, LeftOut, Names
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Frame, Paths, numbers, table
-from gpca.declarations.step import Step
+from gpca.declarations import ByName, Experiment, Frame, LeftOut, Names, Paths, Run, Step, numbers, table
 from gpca.encoders.registry import EncoderChanges, require_draws
 from gpca.errors import InputError
 from gpca.evaluation.intervals import Clustered
@@ -21,11 +18,7 @@ from gpca.experiments.explained import explainer_settings, require_explained
 from gpca.explainers.registry import explainer_entry, explainer_module, explainers
 from gpca.pairs.perturbation import Severities
 from gpca.pairs.shifted_sets import DISTANCES, TRAINED_ON, with_training_like
-from gpca.reporting.sheet import Row, Sheet, Show, crossed, show
-from gpca.reporting.tables.builder import over_clusters
-from gpca.reporting.tables.cells import rows_where
-from gpca.reporting.tables.table import Table
-from gpca.reporting.words import in_words, span
+from gpca.reporting.sheet import Row, Sheet, Show, Table, crossed, in_words, over_clusters, rows_where, show, span
 from gpca.settings import Keys, changes_of
 from gpca.steps.shift import ShiftSettings
 

@@ -8,8 +8,7 @@ import numpy as np
 
 from gpca.active_learning.acquisition import EXPANSION, select, top
 from gpca.active_learning.settings import ActiveLearningSettings
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Figure, Frame, figure
+from gpca.declarations import Figure, Frame, Run, figure
 from gpca.errors import InputError
 from gpca.evaluation.measures import source_method_seed
 from gpca.experiments import registration_stages as drawing

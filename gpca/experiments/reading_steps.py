@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from gpca.declarations.step import Plan, Step
+from gpca.declarations import Plan, Step
 from gpca.experiments.active_learning import learning_settings
 from gpca.experiments.explained import explainer_settings
 from gpca.explainers.registry import explainer_module

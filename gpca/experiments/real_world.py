@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from gpca.causes.settings import FrameCauseSettings
-from gpca.declarations.experiment import EXPLAINERS, Experiment, LeftOut, Names
+from gpca.declarations import EXPLAINERS, Experiment, LeftOut, Names
 from gpca.encoders.reduction import make_reduction, require_room
 from gpca.encoders.registry import OPTIONS, EncoderSettings
 from gpca.errors import InputError, require_names, with_key

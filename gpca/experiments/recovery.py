@@ -8,10 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from gpca.causes.policy import Thresholds
-from gpca.declarations.experiment import Experiment, LeftOut, Names
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Frame, Paths, table
-from gpca.declarations.step import Plan, Step
+from gpca.declarations import Experiment, Frame, LeftOut, Names, Paths, Plan, Run, Step, table
 from gpca.encoders.registry import EncoderChanges
 from gpca.errors import InputError, require_names, with_key
 from gpca.evaluation.measures import ALL
@@ -29,11 +26,7 @@ from gpca.pairs.synthesis import TestSamples, TrainSamples
 from gpca.recovery.actions import ACTIONS, action_of
 from gpca.recovery.policies import PolicyEntry, named_policies, policies, policy_entry, policy_module
 from gpca.recovery.settings import LoopSettings
-from gpca.reporting.sheet import Row, Sheet, show, where
-from gpca.reporting.tables.builder import over_clusters
-from gpca.reporting.tables.cells import plain_cell
-from gpca.reporting.tables.table import Table
-from gpca.reporting.words import plural
+from gpca.reporting.sheet import Row, Sheet, Table, over_clusters, plain_cell, plural, show, where
 from gpca.settings import Bounds, Count, Distinct, Keys, NotNegative, OpenShare, Share, changes_of, part_of
 
 SECTION = "V Robotic deployment for action recovery"

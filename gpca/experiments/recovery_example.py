@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Figure, figure
+from gpca.declarations import Figure, Run, figure
 from gpca.experiments.recovery import SECTION, tables_title
 from gpca.experiments.registration_stages import draw_score_bars
 from gpca.io.arrays import load_arrays

@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from gpca.causes.policy import NOTHING, QUEUE
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Frame, Paths, Series, numbers
+from gpca.declarations import Frame, Paths, Run, Series, numbers
 from gpca.evaluation.intervals import Clustered
 from gpca.evaluation.measures import ALL, Measure, by_value, intervals, over_seeds, tidy
 from gpca.io.csv_file import numbers as number_column

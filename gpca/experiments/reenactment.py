@@ -1,9 +1,7 @@
 """The figure of a re-enactment (docs/causes.md)."""
 
 from gpca.causes.settings import CauseSettings
-from gpca.declarations.experiment import Experiment
-from gpca.declarations.plan import Run
-from gpca.declarations.result import figure
+from gpca.declarations import Experiment, Run, figure
 from gpca.experiments.cause_figures import draw_reenactment
 from gpca.experiments.cause_tables import SECTION
 from gpca.objects.entry import dataset_of

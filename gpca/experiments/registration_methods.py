@@ -11,10 +11,7 @@ import numpy as np
 
 from gpca.alignment.methods import registry
 from gpca.alignment.pose_error import SuccessSettings, success_within
-from gpca.declarations.experiment import ByName, Experiment, LeftOut, Names
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Frame, Paths, numbers, table
-from gpca.declarations.step import Plan, Step
+from gpca.declarations import ByName, Experiment, Frame, LeftOut, Names, Paths, Plan, Run, Step, numbers, table
 from gpca.errors import InputError, require_names, with_key
 from gpca.evaluation import measures as evaluated
 from gpca.evaluation.intervals import Clustered, weighted_mean

@@ -13,8 +13,7 @@ from gpca.attribution.metrics import read_uncertainties
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.causes.settings import Limits
 from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Frame, Series
+from gpca.declarations import Frame, Run, Series
 from gpca.errors import InputError
 from gpca.io.container import require_same_samples
 from gpca.io.csv_file import numbers

@@ -9,10 +9,7 @@ from typing import Any
 import numpy as np
 
 from gpca.alignment.methods.registry import installed, method_entry, method_module
-from gpca.declarations.experiment import Experiment
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Frame, Paths, numbers, table
-from gpca.declarations.step import Plan, Step, Wildcards
+from gpca.declarations import Experiment, Frame, Paths, Plan, Run, Step, Wildcards, numbers, table
 from gpca.evaluation.intervals import Clustered, weighted_mean
 from gpca.evaluation.measures import ALL, SHARE, Measure, Rivals, compared, intervals, per_seed
 from gpca.experiments.registration_methods import missing_methods

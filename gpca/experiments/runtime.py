@@ -6,17 +6,12 @@ from math import inf, nan
 from typing import Annotated
 
 from gpca.comparison.published import HARDWARE, Number, printed_seconds, read_published
-from gpca.declarations.experiment import Experiment, Tidy
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Frame, table
+from gpca.declarations import Experiment, Frame, Run, Tidy, table
 from gpca.errors import InputError
 from gpca.evaluation.runtime_file import COMPONENTS, read_runtime
 from gpca.experiments.frames import frames_of
 from gpca.objects.entry import title_of
-from gpca.reporting.tables.builder import TableBuilder
-from gpca.reporting.tables.cells import plain_cell
-from gpca.reporting.tables.table import EMPTY, Cell, Column, Table
-from gpca.reporting.words import plural
+from gpca.reporting.sheet import EMPTY, Cell, Column, Table, TableBuilder, plain_cell, plural
 from gpca.settings import Bounds
 
 SECTION = "IV-E Real-world validation"

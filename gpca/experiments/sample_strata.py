@@ -6,16 +6,12 @@ import numpy as np
 
 from gpca.causes.judged import CEILING, Judged, decision_measures, read_judged
 from gpca.causes.truth import ALL, BORDERLINE, FAILED, NOMINAL
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Frame, Paths, numbers, table
+from gpca.declarations import Frame, Paths, Run, numbers, table
 from gpca.evaluation.intervals import REPEATS, Clustered
 from gpca.evaluation.measures import POOLED, intervals
 from gpca.experiments import diagnosis
 from gpca.experiments.cause_tables import AGAIN, SECTION
-from gpca.reporting.sheet import Row, Sheet, Show, show, where
-from gpca.reporting.tables.cells import plain_cell
-from gpca.reporting.tables.table import Column
-from gpca.reporting.words import plural
+from gpca.reporting.sheet import Column, Row, Sheet, Show, plain_cell, plural, show, where
 
 DECISIONS = ("named_right", "regret")
 SMALL_MARGIN, LARGE_MARGIN = 0.01, 0.03  # diameters

@@ -19,10 +19,7 @@ from gpca.causes.dataset import LABELS, Causes
 from gpca.causes.scans import GLOBAL, KINDS
 from gpca.causes.settings import SCANS, ScanSamples
 from gpca.causes.truth import BORDERLINE, GEOMETRY
-from gpca.declarations.experiment import Experiment, LeftOut, Names
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Frame, Paths, numbers
-from gpca.declarations.step import Step
+from gpca.declarations import Experiment, Frame, LeftOut, Names, Paths, Run, Step, numbers
 from gpca.encoders.registry import encoder_module
 from gpca.errors import InputError, with_key
 from gpca.evaluation.intervals import TRIVIAL, best_of, corrected, interval, pigeonhole_weights, weighted_mean

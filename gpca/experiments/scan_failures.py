@@ -9,8 +9,7 @@ from gpca.causes.judged import CEILING
 from gpca.causes.scans import GLOBAL, LADDER
 from gpca.causes.settings import OBJECTS, SCANS, DescriptorSettings
 from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
-from gpca.declarations.plan import Run, plain
-from gpca.declarations.result import figure, table
+from gpca.declarations import Run, figure, plain, table
 from gpca.errors import InputError
 from gpca.evaluation.intervals import FEWEST_CLUSTERS, FEWEST_FAILURES, REPEATS
 from gpca.evaluation.measures import POOLED
@@ -26,10 +25,7 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reporting.figures.panels import in_lines, legend_below, panels
 from gpca.reporting.figures.style import CONCEPT_COLORS, GRAY, LIGHT_GRAY, SKY_BLUE, SMALL_PT, TEXT_WIDTH_IN
-from gpca.reporting.sheet import Row, Sheet, show, where
-from gpca.reporting.tables.cells import interval_cell, plain_cell
-from gpca.reporting.tables.table import Column
-from gpca.reporting.words import plural
+from gpca.reporting.sheet import Column, Row, Sheet, interval_cell, plain_cell, plural, show, where
 
 MEASURED = {"measured": (scans.read_scan_causes, "scan_causes.csv")}
 LEARNED = {OBJECTS: "objects", SCANS: "other scenes", "": "–"}

@@ -12,9 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from gpca.alignment.methods.registry import installed, method_entry, method_module, require_global, require_settings
-from gpca.declarations.experiment import Experiment, LeftOut, Names
-from gpca.declarations.plan import Run, plain
-from gpca.declarations.result import Frame, Paths, numbers, table
+from gpca.declarations import Experiment, Frame, LeftOut, Names, Paths, Run, numbers, plain, table
 from gpca.declarations.step import Plan, Step, Wildcards
 from gpca.errors import InputError, require_names, with_key
 from gpca.evaluation.intervals import Clustered
@@ -22,9 +20,7 @@ from gpca.evaluation.measures import ALL, Measure, Parts, over_seeds, read_sampl
 from gpca.experiments.registration_methods import method_rows, missing_methods, read_seconds, row_name
 from gpca.io.csv_file import read_numbers
 from gpca.objects.entry import Name, title_of
-from gpca.reporting.sheet import Row, Sheet, show, where
-from gpca.reporting.tables.cells import plain_cell
-from gpca.reporting.words import plural
+from gpca.reporting.sheet import Row, Sheet, plain_cell, plural, show, where
 from gpca.scans.pair import Rung, ScanSuccess
 from gpca.scans.scene import stratum_name, stratum_of
 from gpca.scans.source import ScanEntry, data_files, entry_of, place_of

@@ -13,10 +13,7 @@ from gpca.attribution.predictions import read_predictions
 from gpca.causes.dataset import Causes
 from gpca.causes.judged import CEILING, MEASURES, Judged, ceiling_of, counted, joined, judged_by, measure
 from gpca.causes.settings import Calls
-from gpca.declarations.experiment import Experiment, LeftOut, Names
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Frame, Paths, numbers, table
-from gpca.declarations.step import Plan, Step, Wildcards
+from gpca.declarations import Experiment, Frame, LeftOut, Names, Paths, Plan, Run, Step, Wildcards, numbers, table
 from gpca.encoders.registry import encoder_module
 from gpca.errors import InputError, with_key
 from gpca.evaluation.intervals import ANYTHING, REPEATS, TRIVIAL, Clustered
@@ -26,10 +23,7 @@ from gpca.experiments.diagnosis import CAUSES_FILES, FURTHER, TABLE, cause_title
 from gpca.experiments.leads import JUDGED, TRAINED, trained_rivals
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module
 from gpca.io.container import require_same_samples
-from gpca.reporting.sheet import Row, Sheet, Show, show
-from gpca.reporting.tables.cells import plain_cell, rows_where
-from gpca.reporting.tables.table import Cell
-from gpca.reporting.words import plural
+from gpca.reporting.sheet import Cell, Row, Sheet, Show, plain_cell, plural, rows_where, show
 from gpca.seeds import seed_of_file
 from gpca.settings import Bounds, Count, Distinct, read_settings
 from gpca.steps.shifts import LABELS, STANDARD, Shift

@@ -10,18 +10,14 @@ from typing import Annotated, Any, get_args
 import numpy as np
 
 from gpca.comparison.readings import read_judged, summarize, unresolved
-from gpca.declarations.experiment import Experiment, Names, Tidy
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Figure, Frame, figure, table
+from gpca.declarations import Experiment, Figure, Frame, Names, Run, Tidy, figure, table
 from gpca.errors import InputError
 from gpca.experiments import reading_words
 from gpca.experiments.frames import frames_of
 from gpca.frames.source import REAL_WORLD, conditions_of
 from gpca.objects.entry import stand_in_clause
 from gpca.pairs.perturbation import Severities
-from gpca.reporting.tables.builder import TableBuilder
-from gpca.reporting.tables.cells import plain_cell, rows_where
-from gpca.reporting.tables.table import Cell, Column, Table
+from gpca.reporting.sheet import Cell, Column, Table, TableBuilder, plain_cell, rows_where
 from gpca.settings import Keys
 from gpca.steps.readings import groups
 from gpca.steps.readings.groups import FRAME_REPEATS, GROUPS, OtherSeverities, ReadingSizes

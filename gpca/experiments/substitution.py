@@ -8,9 +8,7 @@ import numpy as np
 
 from gpca.alignment.methods.registry import installed, method_entry, method_module
 from gpca.attribution.predictions import read_predictions
-from gpca.declarations.experiment import EXPLAINERS, ByName, Experiment, LeftOut
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Frame, Paths, numbers, table
+from gpca.declarations import EXPLAINERS, ByName, Experiment, Frame, LeftOut, Paths, Run, numbers, table
 from gpca.declarations.step import Plan, Step, Wildcards
 from gpca.errors import with_key
 from gpca.evaluation.intervals import Clustered

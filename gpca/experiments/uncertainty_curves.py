@@ -8,8 +8,7 @@ import pandas as pd
 
 from gpca.attribution.diagnostics import BINS
 from gpca.attribution.learner_predictions import read_learner_predictions, sets_of, wrong
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Figure, figure
+from gpca.declarations import Figure, Run, figure
 from gpca.errors import InputError
 from gpca.evaluation.intervals import mean_interval, wilson_interval
 from gpca.experiments.out_of_distribution import SECTION, learner_titles

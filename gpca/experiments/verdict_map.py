@@ -15,8 +15,7 @@ from gpca.comparison.verdicts import (
     REPRODUCED,
     judged_once,
 )
-from gpca.declarations.plan import Run
-from gpca.declarations.result import Figure, Frame, figure
+from gpca.declarations import Figure, Frame, Run, figure
 from gpca.io.csv_file import read_numbers
 from gpca.reporting.figures.style import (
     GRAY,

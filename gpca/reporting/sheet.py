@@ -1,4 +1,7 @@
-"""Tables as rows × columns of selections: each says which rows of the measured numbers its cells show."""
+"""Tables as rows × columns of selections: each says which rows of the measured numbers its cells show.
+
+Experiments import from here what tables are made of.
+"""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -7,9 +10,9 @@ from typing import Any
 
 from gpca.io.frame import Frame
 from gpca.reporting.tables.builder import FAMILIES, Label, TableBuilder, over_clusters
-from gpca.reporting.tables.cells import cell_of_repeats, interval_cell, where
-from gpca.reporting.tables.table import Cell, Column, Table
-from gpca.reporting.words import span
+from gpca.reporting.tables.cells import cell_of_repeats, interval_cell, plain_cell, rows_where, where  # noqa: F401
+from gpca.reporting.tables.table import EMPTY, Cell, Column, Table  # noqa: F401
+from gpca.reporting.words import dataset_in_words, in_words, plural, span  # noqa: F401
 
 
 @dataclass(frozen=True)
