@@ -4,8 +4,7 @@
 its function writes. The function gets a :class:`gpca.declarations.plan.Run` first, and then its inputs by name:
 
 - ``intervals="causes_intervals.csv"``: a file of numbers, read by :func:`gpca.evaluation.measures.read_rows`;
-- ``seconds=(read_seconds, "timings/{source}/seed{seed}.csv")``: what the function makes of these files; several
-  arguments of the reader are given as a mapping;
+- ``seconds=(read_seconds, "timings/{source}/seed{seed}.csv")``: what the function makes of these files;
 - ``files="methods/{source}/{method}/seed{seed}.csv"``: the paths, if the pattern has braces or is no CSV file.
 
 A name in braces stands for all its values (:func:`gpca.experiments.run.names_of`); a result is left out where one of
@@ -28,7 +27,7 @@ else:  # planning does not import it
     Figure = Any
 
 READ_ROWS = "gpca.evaluation.measures:read_rows"
-Given = str | tuple[Callable, str | Sequence[str] | Mapping[str, str]]
+Given = str | tuple[Callable, str | Sequence[str]]
 Paths = Iterable[str | Path]  # of files that a function reads
 Function = TypeVar("Function", bound=Callable)
 
@@ -86,12 +85,10 @@ def _declared(
     for argument, of in inputs.items():
         if isinstance(of, str):
             is_numbers = of.endswith(".csv") and "{" not in of
-            given.append(Input(argument, {"": (of,)}, READ_ROWS if is_numbers else ""))
-            continue
-        read, patterns = of
-        by_keyword = patterns if isinstance(patterns, Mapping) else {"": patterns}
-        files = {key: (each,) if isinstance(each, str) else tuple(each) for key, each in by_keyword.items()}
-        given.append(Input(argument, files, f"{read.__module__}:{read.__name__}"))
+            given.append(Input(argument, (of,), READ_ROWS if is_numbers else ""))
+        else:
+            read, files = of[0], (of[1],) if isinstance(of[1], str) else tuple(of[1])
+            given.append(Input(argument, files, f"{read.__module__}:{read.__name__}"))
 
     def declare(function: Function) -> Function:
         function.result = Result(  # type: ignore[attr-defined]

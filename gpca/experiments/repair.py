@@ -19,7 +19,7 @@ from gpca.guarantee.acceptance import accepted_in_hindsight
 from gpca.io.csv_file import ANY, read_csv
 from gpca.io.csv_file import numbers as number_column
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.sheet import Row, Sheet, Show, crossed, show
+from gpca.reporting.sheet import Row, Sheet, crossed, show
 from gpca.seeds import seed_of_file
 from gpca.settings import Distinct
 from gpca.steps.repair import LIKELIEST, MANY_STARTS, REPAIR, STARTS, Asked
@@ -259,13 +259,12 @@ SHOWN = {
 SECONDS = show("seconds", "ms", factor=1e3, frame="seconds", interval=False, limits=(0, inf), least_is_best=True)
 
 
-def titles_of(config: Mapping[str, Any], judged: bool = True) -> dict[str, str]:
+def titles_of(config: Mapping[str, Any]) -> dict[str, str]:
     """Titles of the rows by name: repair, and rivals by their best tests and by the judge."""
     names = installed(config[NAME]["methods"])
     titles = BUILT_IN | {name: method_entry(name).title for name in names}
     both = ((name, title) for name, title in titles.items() if name != REPAIR)
-    by_judge = {f"{name}_{JUDGED}": f"{title}, by the judge" for name, title in both}
-    return titles | (by_judge if judged else {})
+    return titles | {f"{name}_{JUDGED}": f"{title}, by the judge" for name, title in both}
 
 
 def repair_sheet(titles: Mapping[str, str], intervals: Frame, seconds: Frame) -> Sheet:
@@ -307,42 +306,6 @@ def table20_repair(run: Run, intervals, seconds):
     )
 
 
-def part_titles(run: Run) -> dict[str, str]:
-    """Titles of the parts that tables show."""
-    points = {"few": "Up to 256 points", "some": "Up to 512", "many": "More"}
-    starts = {"near": "Start near", "middle": "Middle", "far": "Far"}
-    return {name: name.capitalize() for name in CONCEPTS} | points | starts | run.source_titles
-
-
-PARTS_NOTE = "Near, middle and far: thirds of the failed registrations, by the error of their start."
-
-
-@table(
-    SECTION,
-    "Table XX by cause, points, start and source",
-    """Repaired shares of the failed registrations of the track of causes, by their dominant cause, the number of
-    points of the smaller cloud, the error of the start, and source.""",
-    intervals="repair.csv",
-)
-def table20_parts(run: Run, intervals):
-    titles, parts = titles_of(run.config, judged=False), part_titles(run)
-    rows = [Row([method], {"source": CAUSES, "method": method[0]}) for method in titles.items()]
-    columns: dict[str, Show] = {
-        part: show("repaired", f"{title} (%)", part, decimals=0) for part, title in parts.items()
-    }
-    sheet = Sheet("table20_parts", {"method": "Method"}, rows, columns, intervals)
-    failed = {title: sheet.samples(part) for part, title in parts.items() if (0, part) in sheet.cells}
-    return sheet.table(
-        "Failed registrations that are repaired (%), by part" + run.stand_ins(),
-        "part",
-        (
-            f"{sheet.over()}. Failed: {', '.join(f'{title} {count}' for title, count in failed.items())}.",
-            f"Rivals are accepted by their best tests, as in Table XX. {PARTS_NOTE}",
-        ),
-        bold=columns,
-    )
-
-
 @table(
     SECTION,
     "Table XX, lead by part",
@@ -350,13 +313,18 @@ def table20_parts(run: Run, intervals):
     intervals="repair.csv",
 )
 def table20_lead(run: Run, intervals):
-    of = {"source": CAUSES, "method": REPAIR}
-    rows = [Row([part], of | {"concept": part[0]}) for part in ({ALL: "All"} | part_titles(run)).items()]
+    titles = {name: name.capitalize() for name in (ALL, *CONCEPTS)}
+    titles |= {"few": "Up to 256 points", "some": "Up to 512", "many": "More"}
+    titles |= {"near": "Start near", "middle": "Middle", "far": "Far"} | run.source_titles
+    rows = [Row([part], {"source": CAUSES, "method": REPAIR, "concept": part[0]}) for part in titles.items()]
     columns = {
         name: replace(column, where={key: value for key, value in column.where.items() if key != "concept"})
         for name, column in SHOWN.items()
         if name in ("repaired", "right_pose", "hindsight", "lead")
     }
     sheet = Sheet("table20_lead", {"part": "Failed registrations"}, rows, columns, intervals)
-    notes = (f"{sheet.over()}. {PARTS_NOTE} The best rival is picked for each part.",)
+    notes = (
+        f"{sheet.over()}. Near, middle and far: thirds of the failed registrations, by the error of their start. The "
+        "best rival is picked for each part.",
+    )
     return sheet.table("Lead of repair over the best rival, by part" + run.stand_ins(), "metric", notes)

@@ -1,11 +1,10 @@
 """Seconds of every stage of an explanation (Table VII)."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from math import inf, nan
 from typing import Annotated
 
-from gpca.comparison.published import HARDWARE, Number, printed_seconds, read_published
+from gpca.comparison.published import HARDWARE, printed_seconds, read_published
 from gpca.declarations import Experiment, Frame, Run, Tidy, table
 from gpca.errors import InputError
 from gpca.evaluation.runtime_file import COMPONENTS, read_runtime
@@ -15,7 +14,6 @@ from gpca.reporting.sheet import EMPTY, Cell, Column, Table, TableBuilder, plain
 from gpca.settings import Bounds
 
 SECTION = "IV-E Real-world validation"
-INPUTS = {"runtime": (read_runtime, "runtime.csv"), "published": (read_published, {})}
 
 
 @dataclass(frozen=True)
@@ -34,12 +32,12 @@ EXPERIMENT = Experiment(name="runtime", sections={"runtime": RuntimeSettings}, t
     """Table VII of the paper: how long each component takes on this machine, and on the paper's. Compare ratios rather
     than times, since the hardware differs.""",
     paper=True,
-    **INPUTS,
+    runtime=(read_runtime, "runtime.csv"),
 )
-def table7_runtime(run: Run, runtime: Frame, published: Iterable[Number]) -> Table:
+def table7_runtime(run: Run, runtime: Frame) -> Table:
     if runtime.empty:
         raise InputError("runtime", "has no rows", "run the step 'runtime' first")
-    printed = printed_seconds(published)
+    printed = printed_seconds(read_published())
     heads = {"component": "Component", "device": "Device", "published_device": "Device (paper)"}
     sheet = TableBuilder("table7_runtime", heads)
     for row in runtime.itertuples():

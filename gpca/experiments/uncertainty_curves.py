@@ -1,6 +1,7 @@
 """How useful the uncertainty of learners is: risk over coverage, reliability, uncertainty over distance (Table V)."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,7 @@ import pandas as pd
 
 from gpca.attribution.diagnostics import BINS
 from gpca.attribution.learner_predictions import read_learner_predictions, sets_of, wrong
-from gpca.declarations import Figure, Run, figure
+from gpca.declarations import Figure, Paths, Run, figure
 from gpca.errors import InputError
 from gpca.evaluation.intervals import mean_interval, wilson_interval
 from gpca.experiments.out_of_distribution import SECTION, learner_titles
@@ -29,13 +30,18 @@ FEWEST = 5  # samples of a bin of confidence that has a point
 PREDICTIONS, SET_FILES = "learners/{source}/{learner}/seed{seed}.csv", "shifted/{source}/seed{seed}.npz"
 
 
+def read_with_distances(files: Paths) -> dict:
+    sets = [path for path in files if Path(path).suffix == ".npz"]
+    return read_learner_predictions([path for path in files if path not in sets], sets)
+
+
 @figure(
     SECTION,
     "Risk over coverage",
     """Share of errors among the most confident samples, over the share that is kept. The curve falls towards the left
     if a classifier knows what it does not know; the axis may cut it below 10 %. Bands are 95 % intervals over the
     seeds. The area under it is the AURC of Table V (the paper's AUC), which has every classifier.""",
-    learned=(read_learner_predictions, {"prediction_files": PREDICTIONS}),
+    learned=(read_learner_predictions, PREDICTIONS),
 )
 def coverage_risk(run: Run, learned: Mapping) -> Figure:
     shown, columns = _shown(run, learned)
@@ -69,7 +75,7 @@ def coverage_risk(run: Run, learned: Mapping) -> Figure:
     """Accuracy over confidence: above the diagonal a classifier is underconfident, below it overconfident. Vertical
     lines are Wilson's intervals (95 %) of independent samples. The number is the calibration error of the samples of
     all seeds together (pooled ECE); Table V has the mean of each seed's own.""",
-    learned=(read_learner_predictions, {"prediction_files": PREDICTIONS}),
+    learned=(read_learner_predictions, PREDICTIONS),
 )
 def reliability(run: Run, learned: Mapping) -> Figure:
     shown, columns = _shown(run, learned)
@@ -106,7 +112,7 @@ def _draw_reliability(panel, confidence_S: np.ndarray, right_S: np.ndarray, colo
     and with the samples of each shift; ρ of Table V is the rank correlation of the two. Bands are 95 % intervals of
     independent samples, and n counts those of all seeds. The distance is the mean to the ten nearest training samples,
     in the paper's classic (analytical) features, each in units of its standard deviation over the training samples.""",
-    learned=(read_learner_predictions, {"prediction_files": PREDICTIONS, "set_files": SET_FILES}),
+    learned=(read_with_distances, (PREDICTIONS, SET_FILES)),
 )
 def uncertainty_vs_distance(run: Run, learned: Mapping) -> Figure:
     shown, columns = _shown(run, learned)

@@ -20,7 +20,7 @@ class Input:
     """The source of one argument of a builder."""
 
     argument: str  # its name
-    files: Mapping[str, tuple[str, ...]]  # keyword of the reader, or "" -> patterns below the folder of a run
+    files: tuple[str, ...]  # patterns below the folder of a run
     read: str = ""  # ``module:function`` that turns the files into the argument; empty for the paths themselves
 
 
@@ -48,15 +48,9 @@ class Result:
         return [function.split(":")[0] for function in functions]
 
     @property
-    def readers(self) -> dict[str, dict]:
-        """How each argument is read, as data for the rules: the function, and its keywords' names of files."""
-        return {
-            source.argument: {
-                "function": source.read,
-                "keywords": {keyword: input_name(source.argument, keyword) for keyword in source.files},
-            }
-            for source in self.inputs
-        }
+    def readers(self) -> dict[str, str]:
+        """The function that reads each argument, empty for the paths themselves."""
+        return {source.argument: source.read for source in self.inputs}
 
     def file(self, suffix: str) -> str:
         """Return a path below the folder of a run, e.g. ``tables/table2_per_concept.md``."""
@@ -73,17 +67,13 @@ class Result:
         return self.all_files[0]
 
     def files(self, names: Names) -> dict[str, list[str] | str]:
-        """Return the files of each input, a path where there can be but one; see :func:`input_name` for the keys."""
-        return {
-            input_name(source.argument, keyword): expand(patterns, self._shown(names))
-            for source in self.inputs
-            for keyword, patterns in source.files.items()
-        }
+        """Return the files of each input, a path where there can be but one."""
+        return {source.argument: expand(source.files, self._shown(names)) for source in self.inputs}
 
     def is_made(self, names: Names) -> bool:
         """Return whether a run with these names makes it: none of those that it takes is empty."""
         shown = self._shown(names)
-        patterns = [pattern for source in self.inputs for of_key in source.files.values() for pattern in of_key]
+        patterns = [pattern for source in self.inputs for pattern in source.files]
         return all(shown[name] for name in (*self.needs, *_braced(patterns)))
 
     @property
@@ -97,10 +87,7 @@ class Result:
         def named(text: str) -> str:
             return text.replace("{source}", source)
 
-        inputs = tuple(
-            replace(each, files={key: tuple(map(named, patterns)) for key, patterns in each.files.items()})
-            for each in self.inputs
-        )
+        inputs = tuple(replace(each, files=tuple(map(named, each.files))) for each in self.inputs)
         return replace(self, name=named(self.name), title=named(self.title), inputs=inputs, source=source)
 
     def _shown(self, names: Names) -> dict[str, Any]:
@@ -133,11 +120,6 @@ def by_section(results: Iterable[Any]) -> dict[str, list[Any]]:
     return sections
 
 
-def input_name(argument: str, keyword: str) -> str:
-    """Return the name of an input's files: the argument, and the reader's keyword where it has several."""
-    return f"{argument}_{keyword}" if keyword else argument
-
-
 def expand(patterns: tuple[str, ...], names: Names) -> list[str] | str:
     """Return the files of all combinations of the names in braces; a path where none of these is listed."""
     files = []
@@ -150,14 +132,10 @@ def expand(patterns: tuple[str, ...], names: Names) -> list[str] | str:
 
 
 def build(
-    builder: str, readers: Mapping[str, Mapping], files: Mapping[str, Any], arguments: Mapping[str, Any], run: Any
+    builder: str, readers: Mapping[str, str], files: Mapping[str, Any], arguments: Mapping[str, Any], run: Any
 ) -> Any:
     """Read the inputs (:attr:`Result.readers`, :meth:`Result.files`) and call the builder: run, inputs, arguments."""
-    inputs = {}
-    for argument, reader in readers.items():
-        given = {keyword: files[name] for keyword, name in reader["keywords"].items()}
-        read = load(reader["function"]) if reader["function"] else lambda path: path
-        inputs[argument] = read(given[""]) if "" in given else read(**given)
+    inputs = {name: load(reader)(files[name]) if reader else files[name] for name, reader in readers.items()}
     return load(builder)(run, **inputs, **arguments)
 
 

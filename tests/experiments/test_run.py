@@ -13,7 +13,6 @@ from gpca.experiments.claims import compared_sources
 from gpca.experiments.run import explainer_of, files_behind, names_of
 from gpca.objects.entry import title_of
 from gpca.process.registry import load as load_function
-from gpca.reporting.registry import input_name
 
 from ..config.configs import load
 
@@ -45,12 +44,9 @@ def test_a_reader_of_one_file_is_given_one_and_a_reader_of_many_a_list(config, s
         files = result.files(names)
         for given in result.inputs:
             if given.read:
-                parameters = inspect.signature(load_function(given.read)).parameters
-                for keyword in given.files:
-                    taken = parameters[keyword] if keyword else next(iter(parameters.values()))
-                    many = any(word in str(taken.annotation) for word in ("Iterable", "Paths", "Sequence", "list"))
-                    is_list = isinstance(files[input_name(given.argument, keyword)], list)
-                    assert is_list == many, f"{result.name}: {given.argument}"
+                taken = next(iter(inspect.signature(load_function(given.read)).parameters.values()))
+                many = any(word in str(taken.annotation) for word in ("Iterable", "Paths", "Sequence", "list"))
+                assert isinstance(files[given.argument], list) == many, f"{result.name}: {given.argument}"
 
 
 def test_tables_of_what_a_run_leaves_out_are_not_made(config, sources):

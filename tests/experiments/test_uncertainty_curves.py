@@ -1,9 +1,15 @@
 import pandas as pd
 import pytest
 
-from gpca.attribution.learner_predictions import read_learner_predictions, sets_of
+from gpca.attribution.learner_predictions import sets_of
 from gpca.errors import InputError
-from gpca.experiments.uncertainty_curves import coverage_risk, distance_curve, reliability, uncertainty_vs_distance
+from gpca.experiments.uncertainty_curves import (
+    coverage_risk,
+    distance_curve,
+    read_with_distances,
+    reliability,
+    uncertainty_vs_distance,
+)
 from gpca.explainers.registry import explainer_entry
 from gpca.io.csv_file import write_csv
 from gpca.pairs.shifted_sets import DISTANCES
@@ -37,7 +43,7 @@ def learned(tmp_path_factory):
         for name, make in MAKE.items():
             predictions.append(folder / "learners" / source / name / "seed0.csv")
             write_csv(predictions[-1], predict_sets(make, sets()))
-    return read_learner_predictions(predictions, set_files)
+    return read_with_distances([*predictions, *set_files])
 
 
 @pytest.mark.parametrize("draw", DRAW)

@@ -19,7 +19,7 @@ def result(*inputs, **fields):
 
 
 def given(pattern, **fields):
-    return Input("metrics", {"": (pattern,)}, **fields)
+    return Input("metrics", (pattern,), **fields)
 
 
 @pytest.mark.parametrize("name", ENTRIES)
@@ -30,10 +30,7 @@ def test_every_builder_and_reader_takes_what_its_entry_gives(name):
     builder.bind(None, **dict.fromkeys({each.argument for each in entry.inputs} | of_source))
     for each in entry.inputs:
         if each.read:
-            keywords = {key: None for key in each.files if key}
-            inspect.signature(load(each.read)).bind(*[None for key in each.files if not key], **keywords)
-        else:
-            assert set(each.files) == {""}
+            inspect.signature(load(each.read)).bind(None)
 
 
 def test_no_name_is_registered_twice_and_the_papers_tables_and_figures_are_marked():
@@ -74,10 +71,7 @@ def test_one_entry_stands_for_a_figure_of_each_source(monkeypatch):
 def test_a_builder_is_given_the_run_and_what_was_read(tmp_path):
     path = tmp_path / "given.json"
     path.write_text("[1, 2]")
-    readers = {
-        "iterable": {"function": "tests.reporting.test_registry:read", "keywords": {"": "iterable"}},
-        "key": {"function": "", "keywords": {"": "key"}},
-    }
+    readers = {"iterable": "tests.reporting.test_registry:read", "key": ""}
     built = build(
         "tests.reporting.test_registry:show", readers, {"iterable": str(path), "key": "a"}, {"source": "ycb"}, "run"
     )
@@ -91,22 +85,6 @@ def read(path):
 
 def show(run, iterable, key, source):
     return run, iterable, key, source
-
-
-def test_a_reader_of_several_kinds_of_files_is_given_each_by_its_keyword():
-    both = Input("learned", {"a": ("a.csv",), "b": ("b.csv",)}, "tests.reporting.test_registry:joined")
-    entry = result(both)
-    assert entry.files(NAMES) == {"learned_a": "a.csv", "learned_b": "b.csv"}
-    built = build("tests.reporting.test_registry:only", entry.readers, entry.files(NAMES), {}, None)
-    assert built == "a.csv and b.csv"
-
-
-def joined(a, b):
-    return f"{a} and {b}"
-
-
-def only(_run, learned):
-    return learned
 
 
 def test_short_names_are_the_papers_a_misspelt_one_is_answered_and_sections_keep_their_order():

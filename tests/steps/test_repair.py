@@ -15,7 +15,6 @@ from gpca.experiments.repair import (
     mean_seconds,
     measured,
     table20_lead,
-    table20_parts,
     table20_repair,
 )
 from gpca.io.csv_file import write_csv
@@ -129,9 +128,10 @@ def test_the_tables_show_every_track_and_part(tmp_path):
     run = run_with()
     numbers = collect(run, tmp_path / "verdicts.csv")
     seconds = mean_seconds(pd.DataFrame({"method": [REPAIR, "fgr"], "seconds": [0.05, 0.1], "seed": 0}))
-    whole, parts, lead = table20_repair(run, numbers, seconds), table20_parts(run, numbers), table20_lead(run, numbers)
+    whole, lead = table20_repair(run, numbers, seconds), table20_lead(run, numbers)
     assert whole.printed()["rows"][0][0][0] == "Causes" and len(whole.rows) == 5
-    assert {"pose", "some", "near", "far"} <= set(parts.columns) and "few" not in parts.columns
+    parts = {labels[0][0] for labels in lead.rows}
+    assert {"pose", "some", "near", "far"} <= parts and "few" not in parts
     thirds = [row for row, labels in enumerate(lead.rows) if labels[0][0] in THIRDS]
     n_thirds = [lead.cells[row, "lead"].test_samples for row in thirds]
     assert len(thirds) == 3 and max(n_thirds) - min(n_thirds) <= 1

@@ -50,7 +50,7 @@ def share_within_limits(cell: Cell, column: Column) -> Cell:
     They are the farther ones of that interval, cut at the limits, and of Wilson's. For this a cluster counts once in
     each seed, or where the clusters are not known, a sample in one seed alone; without either there is no interval.
     """
-    is_share = column.of_samples and column.limits == SHARE and not column.beside
+    is_share = column.limits == SHARE and not column.beside
     if not is_share or cell.bounds or cell.at_least or isnan(cell.half_width):
         return cell
     (least, most), low, high = SHARE, cell.mean - cell.half_width, cell.mean + cell.half_width

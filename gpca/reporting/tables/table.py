@@ -49,7 +49,6 @@ class Column:
     least_is_best: bool = False
     beside: str = ""  # another column, behind whose cells these stand with their sign in brackets; the CSV holds both
     heavy_tail: bool = False  # an interval wider than the mean is not printed, as it would reach below zero
-    of_samples: bool = True  # False for percentages that are no shares of samples, such as mean confidences
 
     def text(self, cell: Cell) -> str:
         """Return e.g. ``97.7 ± 0.4``, ``97.7 (96.9 to 98.2)`` or ``> 52.0``; beside another ``+1.2; 0.4 to 1.9``."""
