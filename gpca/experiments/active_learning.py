@@ -126,12 +126,9 @@ CURVES = {"curve_files": "active_learning/{source}/{pool_strategy}/seed{seed}.cs
     SECTION,
     "Table III: labels needed for a new concept",
     """Table III of the paper: how many labels, chosen by BALD with k-means, by BALD or at random, a classifier needs
-    to reach the target accuracy when it meets a concept that it has never seen; the final accuracy; and the passes
-    over the labels.
-
-    Rows differ in the share of the new concept in the pool, in the classifier, and in whether the encoder had seen
-    the concept; the paper states neither share nor encoder. The row with 5 % follows the paper. Fewer labels are
-    better; ">" marks a mean in which some repeats never reached the target.""",
+    to reach the target accuracy when it meets a concept that it has never seen. Rows differ in the share of the new
+    concept in the pool and in whether the encoder had seen it, which the paper leaves open; the row with 5 % follows
+    it.""",
     paper=True,
     **INPUTS,
 )
@@ -151,12 +148,11 @@ def table3_active_learning(run: Run, metrics: Frame, clusters: Clusters) -> Tabl
     }
     rows = crossed(("source", run.source_titles), ("setting", settings))
     inputs = metrics[metrics["concept"] == PAPERS_HELD_OUT], clusters
-    other = "Other rows: " if shares else ""
     notes = [
         *_rare_note(learning),
-        f"{other}{_protocol(run)} It moves the posterior alone, in at most {learning['iterations']} passes over the "
+        f"{'Other rows: ' if shares else ''}{_protocol(run)} Retraining moves the posterior alone, in at most "
+        f"{learning['iterations']} passes over the labels. Epochs: passes that reached the target. Acc.: after all "
         "labels.",
-        "Epochs: passes of the retraining that reached the target. Acc.: after all labels.",
     ]
     caption = f"Labels until a GPC that knew noise and pose reaches {learning['target']:.0%} on all concepts"
     heads = "source", "setting"
@@ -194,11 +190,7 @@ def _table(
     SECTION,
     "Learning curves",
     """Accuracy over the number of labels, by strategy: the mean over the concepts, each held out in turn, and over the
-    seeds. Table III is overlap alone, whose curves are in "Learning curves, overlap held out". The sooner a curve
-    crosses the target line, the fewer labels its strategy needs.
-
-    Bands are 95 % intervals over the seeds. Only the two thick curves have them, the paper's strategies, which stand
-    in every panel; the other strategies are shared out among the panels of a setting.""",
+    seeds. The paper's two strategies are thick, have 95 % intervals over the seeds and stand in every panel.""",
     needs=("further_concept",),
     **CURVES,
 )
@@ -210,8 +202,8 @@ def active_learning_curves(run: Run, curve_files: Paths) -> Figure:
     SECTION,
     "Learning curves, overlap held out",
     """The curves behind Table III: the paper's experiment alone, in which overlap is the new concept. The last row
-    shows the paper's classifier and a pool in which the concept is rare. Bands are 95 % intervals over the seeds,
-    of the two thick curves, which stand in every panel.""",
+    shows the paper's classifier and a pool in which the concept is rare. The paper's two strategies are thick, have
+    95 % intervals over the seeds and stand in every panel.""",
     **CURVES,
 )
 def active_learning_overlap(run: Run, curve_files: Paths) -> Figure:
@@ -250,10 +242,9 @@ def table3_extended(run: Run, metrics: Frame, clusters: Clusters) -> Table:
     ]
     notes = [
         _protocol(run),
-        "Labels: until the target, by the concept held out. Reached: share of the runs that reached it. Accuracy: "
-        "after all labels; New: that on the concept held out. Area: mean accuracy over the budget. Gain: area "
-        "minus that of random sampling from the same start, paired by seed. All but Labels are means over the "
-        "concepts held out, then over the seeds.",
+        "Labels: until the target, by the concept held out. Accuracy: after all labels; New: that on the concept "
+        "held out. Gain: area minus that of random sampling from the same start. All but Labels: means over the "
+        "concepts held out.",
     ]
     caption = f"Active learning of a held-out concept by every strategy, to {learning['target']:.0%}"
     bold, inputs = [key for key in columns if key != "reached"], (metrics, clusters)
@@ -281,14 +272,11 @@ def table3_stream(run: Run, metrics: Frame, clusters: Clusters) -> Table:
     rows = crossed(("source", run.source_titles), ("method", streams))
     heads, inputs = ("source", "strategy"), (metrics[metrics["table"] == f"{TABLE}pretrained"], clusters)
     notes = [
-        f"{stream['arrivals']} samples arrive one by one; the first {stream['quiet']} are of the two known "
-        f"concepts ({learning['initial']} labeled samples at the start); a third of the others is new. A label "
-        f"may be requested for {stream['budget']:.0%} of the arrivals; the GPC learns it at once, or the learner "
-        "that the row names, simplified as docs/active_learning.md says.",
-        "Delay: arrivals from the first sample of the new concept until half of its test samples are named right; "
-        "'>': some runs ended before. Running: accuracy over the last arrivals, each judged before its label is "
-        "known. Accuracy, New: on all test samples and those of the new concept, at the end. All but Delay are "
-        "means over the concepts held out, then over the seeds.",
+        f"{stream['arrivals']} samples, the first {stream['quiet']} of the two known concepts, of the others a third "
+        f"new; a label may be requested for {stream['budget']:.0%} of them. Delay: arrivals from the first new sample "
+        "until half of its concept's test samples are named right; '>': some runs ended before. Running: accuracy "
+        "over the last arrivals, each judged before its label is known. All but Delay: means over the concepts held "
+        "out."
     ]
     bold = [key for key in columns if "labels" not in key]
     caption = "A new concept in a stream of registrations"
@@ -301,21 +289,18 @@ def _protocol(run: Run) -> str:
         f"Start: {learning['initial']} labeled samples of the two known concepts. Pool: the other "
         f"{train - learning['initial']} training samples, with all of the new concept, a third of {train}. "
         f"{learning['batch']} labels a round, {learning['labels']} in all; '>': some runs did not reach the target "
-        "and count with all labels. Every strategy gets the same start, pool, test samples and retraining."
+        "and count with all labels."
     )
 
 
 def _rare_note(learning: Mapping) -> list[str]:
     if not (rare := learning["rare"]):
         return []
-    gpc = rare["gpc"]
-    few = rare.get("beside_seeds")
+    gpc, few = rare["gpc"], rare.get("beside_seeds")
     beside = f" Shares but the first: over at most the first {plural(few, 'seed')}." if few else ""
     return [
         "Where so many percent of the pool are new (5 % are compared with the paper), the paper's classifier "
-        f"({gpc['kernel']}, rate {gpc['learning_rate']:g}, {gpc['iterations']} passes) is fitted anew in each round of "
-        f"{rare['batch']} labels, and labels are counted one by one (docs/comparison.md). Start: "
-        f"{learning['initial']} labeled samples of the two known concepts. Labels are given until the target, at "
-        f"least {rare['least']} (then {rare['late_batch']} a round), at most {rare['labels']} or the whole pool; '>': "
-        f"some runs did not reach it. Epochs are counted in steps of {LOOK_EVERY}.{beside}"
+        f"({gpc['kernel']}, rate {gpc['learning_rate']:g}, {gpc['iterations']} passes) is fitted anew in each round "
+        f"(docs/comparison.md): of {rare['batch']} labels, of {rare['late_batch']} from {rare['least']} on, at most "
+        f"{rare['labels']}. Epochs are counted in steps of {LOOK_EVERY}.{beside}"
     ]

@@ -119,12 +119,7 @@ def draw_failures(
 
 
 def _draw_over_solid(
-    panels: np.ndarray,
-    objects: ObjectClouds,
-    causes: Causes,
-    row: int,
-    clouds: Mapping[str, np.ndarray],
-    size: float,
+    panels: np.ndarray, objects: ObjectClouds, causes: Causes, row: int, clouds: Mapping[str, np.ndarray], size: float
 ) -> None:
     """Draw the model of a sample as a shaded solid and clouds over it, each with its name below, at one scale."""
     index = objects.names.index(causes.registrations.object_name[row])

@@ -69,17 +69,10 @@ def counts_and_calls(costs: Mapping[str, Mapping]) -> Callable[[Row, Frame], dic
 @figure(
     SECTION,
     "One failed registration and its counterfactuals",
-    """A failed registration of a test object, registered again with every subset of its causes from the same starts:
-    three of these, with the mean error over the starts. All eight errors give each cause what it added, its Shapley
-    value φ (below, left), and its share in the failure (right, first row). Below that are the scores of some
-    explainers, which saw only the registration with all causes; the largest of each row is bold. Scores are no
-    shares: those of a multi-label explainer need not add up to 1. Observed points are blue, and pale where the model
-    hides them.
-
-    Shown is a usual case with a clear cause: of the failed test samples with several causes whose largest φ is at
-    least 0.6 of the sum, the one whose margin over the next φ is the median. The last column says who names the
-    dominant cause (right), one that adds nearly as much (tie) or something else (wrong). The error in the title is
-    that of the one registration that the explainers see.""",
+    """A failed registration of several causes, registered again with every subset of these: Shapley's value φ of a
+    cause is what it added to the error. Below are the scores of some explainers, which saw only the registration with
+    all causes, and who names the dominant cause (right), one that adds nearly as much (tie) or another (wrong). Shown
+    is the failure with a clear cause, at least 0.6 of the sum, whose margin over the next φ is the median.""",
     objects_npz="objects/{shown_source}.npz",
     causes_npz="causes/{shown_source}/seed{first_seed}.npz",
     predictions_csv="diagnoses/{shown_source}/{cause_explainer}/seed{first_seed}.csv",
@@ -119,12 +112,9 @@ def failures(run: Run, objects_files, causes_files, predictions_csv):
     SECTION,
     "Table IX: what is wrong, and why",
     """Every explainer on registrations whose true causes are measured: does it say whether anything is wrong and which
-    cause did most, and how much of the error would vanish without the cause that it names first? No explainer was
-    trained on a test object, and borderline registrations are not judged.
-
-    The last row of a dataset is the truth measured again from other starts. It has the true pose and the clean
-    clouds: counterfactual access, which no observer has. What an observer may reach is estimated by the learning
-    curve.""",
+    cause did most, and how much of the error would vanish without the cause that it names first? Nothing was trained on
+    a test object. The last row of a dataset is the truth measured again from other starts, which knows the true pose
+    and the clean clouds, as no observer does.""",
     intervals="cause_intervals.csv",
 )
 def table9_causes(run: Run, intervals):
@@ -152,18 +142,15 @@ def table9_causes(run: Run, intervals):
         "Regret: of the failed, the share of the error that removing the best single cause would take away and "
         "removing the named one does not; who names nominal removes nothing. With ties: as Dominant, but any cause "
         "counts whose φ is within the limit of a cause (1 % of the diameter by default) of the largest.",
-        "Balanced: mean share named rightly of nominal and of the three dominant causes. Over trivial: balanced "
-        "accuracy minus that of the best trivial row (chance to density, and hypotheses with thresholds); "
-        "lead: minus that of the best other explainer; both on the same draws, so that it is better "
-        "where the interval is above 0. "
-        "Dominant: of the failed alone, the share whose main cause has the highest score among the causes. No gate "
-        "of nominal helps with that, and guessing is right in 33.3 %."
+        "Balanced: mean share named rightly of nominal and of the three dominant causes. Over trivial, lead: balanced "
+        "accuracy minus that of the best trivial row (chance to density, and hypotheses with thresholds), and of the "
+        "best other explainer, on the same draws. Dominant: of the failed alone, the share whose main cause has the "
+        "highest score among the causes."
         + rule_near_chance(intervals, run.sources, metric="dominant_accuracy", against=""),
-        "False alarms: share of the nominal above the alarm that finds 90 % of the failed. AUROC: of failed "
-        "against nominal. mAP: mean average precision of the sets of causes. Spearman: of scores and measured "
-        "attributions of the failed. ECE: expected calibration error of the score of nominal.",
-        "Gates only say whether something is wrong. The last row is the truth measured again from other starts; it "
-        "has the true pose and the clean clouds, which no observer has: nothing says that it can be reached.",
+        "False alarms: share of the nominal above the alarm that finds 90 % of the failed. AUROC: of failed against "
+        "nominal. mAP: mean average precision of the sets of causes. Spearman: of scores and measured attributions "
+        "of the failed. ECE: expected calibration error of the score of nominal. Gates only say whether something is "
+        "wrong.",
         COST_NOTE,
     )
     caption = "What is wrong with a registration, if anything: objects that no explainer was trained on"
@@ -208,12 +195,10 @@ def table9_features(run: Run, intervals):
     heads = {"source": "Dataset", "explainer": "Learner and what it reads"}
     sheet = Sheet("table9_features", heads, rows, columns, intervals, more=more)
     notes = (
-        "ICP calls: runs beyond the one that is explained. Rows with as many compare what the same price buys. "
-        "Aligned source: thickness, spacing, extent and number of points of the observed cloud. Remedies with few "
-        "calls: those without a restart.",
-        "To the best other: balanced accuracy minus that of the best other row of the dataset, on the same draws. "
-        f"The measures are those of Table IX. Over {plural(sheet.seeds, 'seed')}; in brackets the 95 % "
-        f"interval of a bootstrap over objects and seeds ({REPEATS} draws). Bold: best of a dataset.",
+        "ICP calls: runs beyond the one that is explained. Aligned source: thickness, spacing, extent and number of "
+        "points of the observed cloud. Remedies with few calls: those without a restart.",
+        "To the best other: balanced accuracy minus that of the best other row, on the same draws; others as in "
+        f"Table IX. {sheet.over(clusters='objects')}. Bold: best of a dataset.",
     )
     caption = "What each part of a registration tells of its causes" + run.stand_ins()
     return sheet.table(caption, "metric", notes, bold=[key for key in columns if key not in NOT_COMPARED], same=1)

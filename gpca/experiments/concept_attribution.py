@@ -79,9 +79,7 @@ NOTES = {
     SECTION,
     "Table I: accuracy of SHAP, SA and GP-CA",
     """Table I of the paper: how often SHAP, sensitivity analysis (SA) and GP-CA name the one concept that was
-    perturbed. Guessing is right in a third of the cases.
-
-    GP-CA has two rows: the setting that the paper prints, which the comparison uses, and one trained longer.""",
+    perturbed. Guessing is right in a third of the cases. GP-CA stands as the paper sets it and trained longer.""",
     paper=True,
     only={"explainer": ("shap_additive", "sa_local_additive", *GPCA_FORMS)},
     intervals=(collect_intervals, PREDICTIONS),
@@ -127,9 +125,8 @@ def table2_per_concept(run: Run, intervals):
 @table(
     SECTION,
     "Table I, extended: every explainer",
-    """Every explainer of this suite, including the paper's three, on the same test samples, with its cost.
-
-    Oracles are given what the others have to infer, so they bound their family from above.""",
+    """Every explainer of this suite, including the paper's three, on the same test samples, with its cost. Oracles are
+    given what the others have to infer, so they bound their family from above.""",
     intervals="attribution_intervals.csv",
     metrics=(read_all_metrics, ("metrics.csv", "timings.csv")),
 )

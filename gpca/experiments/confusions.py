@@ -2,8 +2,6 @@
 
 from collections.abc import Iterable, Mapping
 
-import numpy as np
-
 from gpca.attribution.metrics import ABSTAINED, PREDICTED_AS
 from gpca.declarations import Figure, Frame
 from gpca.errors import InputError
@@ -20,11 +18,8 @@ def draw_confusions(
 ) -> Figure:
     """Draw the share of each true concept (rows) that is taken for each (columns), for at most `MOST` explainers.
 
-    Args:
-        metrics: rows of tidy files; all sources and seeds in them are pooled.
-        explainers: title of each name, in order.
-        first: names that are drawn before others.
-        form: of a cell; a second pair of braces holds its count. What is missing to 100 % is abstained.
+    `explainers` are titles by name, of which the `first` are drawn before others. The `form` of a cell has a second
+    pair of braces for its count. What is missing to 100 % is abstained.
     """
     confusions = pooled_confusions(metrics)
     ordered = [name for name in dict.fromkeys((*first, *explainers)) if name in explainers and name in confusions]
@@ -37,8 +32,9 @@ def draw_confusions(
     drawing, [axes] = panels(1, len(shown), (width_in - LABELS_IN) / len(shown) + room_in, width_in, sharey=True)
     for panel, name, words in zip(axes, shown, titles, strict=True):
         concepts = list(confusions[name].columns[:-1])
-        counts_C_C, shares_C_C = counts_and_shares(confusions[name])
-        draw_percentages(panel, 100 * shares_C_C, form, counts_C_C, linespacing=1.2)
+        counts_C_C1 = confusions[name].reindex(concepts).to_numpy(float)
+        percent_C_C1 = 100 * counts_C_C1 / counts_C_C1.sum(axis=1, keepdims=True)
+        draw_percentages(panel, percent_C_C1[:, :-1], form, counts_C_C1[:, :-1], linespacing=1.2)
         panel.set_title(words, pad=3)
         panel.set_xticks(range(len(concepts)), concepts)
         panel.set_yticks(range(len(concepts)), concepts, rotation=90, va="center")
@@ -59,9 +55,3 @@ def pooled_confusions(metrics: Frame) -> dict[str, Frame]:
         table = rows.pivot_table("value", "concept", "predicted", aggfunc="sum", fill_value=0, sort=False)
         pooled[name] = table[[column for column in table.columns if column != ABSTAINED] + [ABSTAINED]]
     return pooled
-
-
-def counts_and_shares(confusion: Frame) -> tuple[np.ndarray, np.ndarray]:
-    """Counts (C, C) of true concepts (rows) that are taken for each (columns), and shares of the row with abstained."""
-    counts_C_C1 = confusion.reindex(list(confusion.columns[:-1])).to_numpy(float)
-    return counts_C_C1[:, :-1], counts_C_C1[:, :-1] / counts_C_C1.sum(axis=1, keepdims=True)

@@ -5,13 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from gpca.declarations import Figure, Frame, Run, figure, table
+from gpca.declarations import Figure, Run, figure, table
 from gpca.errors import InputError
 from gpca.evaluation.intervals import REPEATS
 from gpca.evaluation.measures import ALL, POOLED
 from gpca.experiments.cause_tables import rule_near_chance
 from gpca.experiments.controls import CALLS, OF_TRIVIAL, RIVAL, SECTION, USUAL
-from gpca.experiments.explained import titles
 from gpca.explainers.registry import explainer_entry
 from gpca.reporting.figures import style
 from gpca.reporting.figures.style import SMALL_PT
@@ -41,14 +40,12 @@ POINTS = (-100.0, 100.0)
     SECTION,
     "Table X: with the shortcuts closed",
     """Every explainer with a shortcut closed: clouds whose density says nothing, unseen objects and sources, reversed
-    ICP, and wrong labels. In brackets is the paired change against the paper's protocol with its interval.
-
-    With shuffled labels the accuracy has to be a third, up to chance; otherwise something other than the labels was
-    learned.""",
+    ICP, and wrong labels. In brackets is the paired change against the paper's protocol with its interval. With
+    shuffled labels the accuracy has to be a third, up to chance.""",
     **INTERVALS,
 )
 def table10_controls(run: Run, intervals):
-    explainers = titles(run.config["controls"]["explainers"])
+    explainers = run.titles(explainer_entry, run.config["controls"]["explainers"])
     names = [PAPER, *(name for name in TITLES if name in run.config["controls"]["controls"])]
 
     def accuracy(name: str, title: str, against: str = "", **options: Any) -> Show:
@@ -79,36 +76,23 @@ def table10_controls(run: Run, intervals):
     fewer = ", ".join(f"{TITLES[name]}: {plural(number, 'seed')}" for name, number in seeds.items() if number != usual)
     notes = (
         f"Over {plural(usual, 'seed')}{f' ({fewer})' if fewer else ''}. In brackets: points gained or lost against the "
-        f"paper's protocol, and {BOOTSTRAP}. The change is paired: it is taken over the seeds and objects that the "
-        "control has, so that it differs from the difference of the two levels where the control has fewer seeds. "
-        "Bold: best of a dataset under a control.",
-        "Matched density: every cloud has a random number of points, in training and test. Unseen objects: encoder "
-        "and explainer learned from other objects. Other sources: they learned from one other source. Wrong "
-        "labels: among the explainer's training samples. Shuffled labels teach nothing: guessing gives "
-        "33.3, although in a single source and seed whole clusters of samples may be named by chance.",
-        "Over trivial: accuracy minus that of the best trivial row (chance to density, and hypotheses with thresholds) "
-        "under the same control; lead: minus that of the best other explainer; both on the same draws, so that it is "
-        "better where the interval is above 0. Reads: what an explainer sees of a registration. ICP calls: runs "
-        "beyond the one that it explains.",
+        f"paper's protocol on the seeds and objects that the control has, and {BOOTSTRAP}. Bold: best of a dataset "
+        "under a control.",
+        "Matched density: every cloud has a random number of points, in training and test. Unseen objects, other "
+        "sources: encoder and explainer learned from others. Wrong labels: among the explainer's training samples. "
+        "Shuffled labels teach nothing: guessing gives 33.3, although in a single source and seed whole clusters of "
+        "samples may be named by chance. A dash: a head that is trained with the encoder learns no labels, and one "
+        "source admits no other.",
+        "Over trivial, lead: accuracy minus that of the best trivial row (chance to density, and hypotheses with "
+        "thresholds), and of the best other explainer, under the same control and on the same draws. Reads: what an "
+        "explainer sees of a registration. ICP calls: runs beyond the one that it explains.",
         "Hard: samples of unseen objects with all perturbations, labeled with the one that adds most to the error by "
         "counterfactuals, and drawn so that ten trivial numbers know nothing of it. What reads no embedding learns "
         "from all sources, but from no family that is tested. Guessing is right in 33.3 %."
         + rule_near_chance(intervals, run.sources, table=HARD, metric="accuracy", against=""),
-        "A dash marks a head that is trained with the encoder and learns no labels, and a source that does not admit a "
-        "control.",
     )
     caption = "Accuracy (%) of single-concept attribution with a shortcut closed (change in brackets)" + run.stand_ins()
     return sheet.table(caption, "control", notes, bold=[name for name in names if name != "shuffled"], same=1)
-
-
-def transfers(intervals: Frame) -> Frame:
-    """Accuracies by the source tested and, in the column ``concept``, the source trained on, which may be the same."""
-    rows = rows_where(intervals, metric="accuracy", against="")
-    same = rows_where(rows, table=PAPER)
-    same = same[same["source"] != POOLED]
-    import pandas as pd
-
-    return pd.concat([same.assign(concept=same["source"]), rows_where(rows, table=TRANSFER)])
 
 
 @table(
@@ -120,17 +104,19 @@ def transfers(intervals: Frame) -> Frame:
     **INTERVALS,
 )
 def table10_transfer(run: Run, intervals):
-    explainers = titles(run.config["controls"]["explainers"])
+    import pandas as pd
+
+    accuracies = rows_where(intervals, metric="accuracy", against="")
+    own = accuracies[(accuracies["table"] == PAPER) & (accuracies["source"] != POOLED)]
+    measured = pd.concat([own.assign(concept=own["source"]), rows_where(accuracies, table=TRANSFER)])
+    explainers = run.titles(explainer_entry, run.config["controls"]["explainers"])
     rows = crossed(("method", explainers), ("concept", run.source_titles | {POOLED: "another (mean)"}))
     columns = {name: Show(f"on {title}", where={"source": name}) for name, title in run.source_titles.items()}
     columns[POOLED] = Show("mean", where={"source": POOLED})
     heads = {"explainer": "Explainer", "trained_on": "Learned from"}
-    sheet = Sheet("table10_transfer", heads, rows, columns, transfers(intervals))
-    note = (
-        "Encoder and explainer learned from one source and are asked about the test samples of another; what they "
-        f"learned from is the paper's protocol. Over {plural(sheet.seeds, 'seed')}; in brackets {BOOTSTRAP}."
-    )
-    return sheet.table("Accuracy (%) from each source to each other" + run.stand_ins(), "tested", [note])
+    sheet = Sheet("table10_transfer", heads, rows, columns, measured)
+    notes = [f"{sheet.over(clusters='objects')}."]
+    return sheet.table("Accuracy (%) from each source to each other" + run.stand_ins(), "tested", notes)
 
 
 STEPS = {PAPER: "paper's protocol", UNSEEN: "unseen objects", TRANSFER: "other sources", HARD: "hard"}
@@ -151,22 +137,20 @@ def loophole(run: Run, intervals) -> Figure:
     source = POOLED if len(run.sources) > 1 else next(iter(run.sources))
     rows = rows_where(intervals, source=source, metric="accuracy", against="")
     rows = rows[rows["concept"].isin([ALL, POOLED])]
-    explainers = titles(run.config["controls"]["explainers"])
-    drawn = {name: words for name, words in explainers.items() if name in set(rows["method"])}
-    shown = [name for name in LOOKS if name in drawn] or list(drawn)[: len(LOOKS)]
+    explainers = run.titles(explainer_entry, run.config["controls"]["explainers"])
+    shown = [name for name in LOOKS if name in explainers and (rows["method"] == name).any()]
     if not shown:
         raise InputError("intervals", "have no accuracy of these explainers", "run the controls first")
     drawing, [[panel]] = panels(1, 1, 2.7, style.COLUMN_WIDTH_IN)
-    colors = dict(zip(shown, LOOKS.values(), strict=False)) | LOOKS
     for k, name in enumerate(shown):
         by_table = rows_where(rows, method=name).set_index("table")
         there = [table for table in STEPS if table in by_table.index]
         values = 100 * by_table.loc[there, ["value", "low", "high"]].to_numpy(float)
         across = [list(STEPS).index(table) + SIDE * (k - (len(shown) - 1) / 2) for table in there]
         spread = np.maximum([values[:, 0] - values[:, 1], values[:, 2] - values[:, 0]], 0)  # but for rounding
-        look = {"color": colors[name], "marker": "o", "ms": 3.5, "lw": 1.2, "elinewidth": 0.8}
+        look = {"color": LOOKS[name], "marker": "o", "ms": 3.5, "lw": 1.2, "elinewidth": 0.8}
         panel.errorbar(across, values[:, 0], spread, label=explainers[name], **look)
-        beside = {"va": "center", "fontsize": SMALL_PT, "color": colors[name]}
+        beside = {"va": "center", "fontsize": SMALL_PT, "color": LOOKS[name]}
         panel.text(len(STEPS) - 0.75, values[-1, 0], f"{values[-1, 0]:.0f}", **beside)
     panel.axhline(100 / 3, color=style.GRAY, lw=0.8, ls=":")
     panel.set_xticks(range(len(STEPS)), STEPS.values())

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from gpca.attribution.predictions import read_predictions
+from gpca.causes.judged import ranking
 from gpca.causes.settings import NOT_OF_CAUSES, CauseSettings
 from gpca.declarations import EXPLAINERS, ByName, Experiment, Frame, LeftOut, Paths, Plan, Run, Step, Wildcards, numbers
 from gpca.errors import InputError, with_key
@@ -79,17 +80,20 @@ def _controls_of(plan: Plan, wildcards: Wildcards) -> tuple[list[str], list[str]
     return controls, [name for name in controls if name in RETRAINED]
 
 
-def _reenacted(plan: Plan) -> bool:
-    """Whether an explainer of the hard samples reads their re-enactments."""
-    return any(explainer_entry(name).reads == REENACTED for name in plan.config["controls"]["explainers"])
-
-
-def _of_all(file: str) -> list[str]:
-    return [file.replace("{source}", "{*hard_source}")]
+def _of_all_hard(plan: Plan, wildcards: Wildcards, file: str, read: str = "") -> list[str]:
+    """Hard files of all sources, where the job has hard samples and, if given, an explainer that reads such files."""
+    entries = map(explainer_entry, plan.config["controls"]["explainers"])
+    is_read = not read or any(entry.reads == read for entry in entries)
+    is_asked = HARD in _controls_of(plan, wildcards)[0] and is_read
+    return [file.replace("{source}", "{*hard_source}")] if is_asked else []
 
 
 def _other_sources(plan: Plan, wildcards: Wildcards) -> list[str]:
     return [name for name in plan.names["transfer_source"] if name != wildcards.source]
+
+
+def _causes(plan: Plan) -> dict[str, Any]:
+    return plan.config["causes"] | plan.config["controls"]["hard"]
 
 
 def _settings(plan: Plan, wildcards: Wildcards) -> dict[str, Any]:
@@ -108,23 +112,16 @@ SAMPLE = Step(
         "candidates": "hard/{source}/seed{seed}.csv",
         "timings": "timings/{source}/hard/seed{seed}.csv",
     },
-    settings=lambda plan, wildcards: {
-        **plan.config["causes"],
-        **plan.config["controls"]["hard"],
-        "icp": plan.config["registrations"]["icp"],
-    },
+    settings=lambda plan, wildcards: _causes(plan) | {"icp": plan.config["registrations"]["icp"]},
 )
 REENACT = Step(
     name="reenact_hard",
     run="gpca.steps.causes:reenact",
     inputs={"causes": HARD_FILE, "causes_timings": "timings/{source}/hard/seed{seed}.csv"},
-    outputs={
-        "reenactments": HARD_REENACTED,
-        "timings": "timings/{source}/hard_reenactments/seed{seed}.csv",
-    },
+    outputs={"reenactments": HARD_REENACTED, "timings": "timings/{source}/hard_reenactments/seed{seed}.csv"},
     settings=lambda plan, wildcards: {
         "reenactment": plan.config["diagnosis"]["reenactment"],
-        "causes": {**plan.config["causes"], **plan.config["controls"]["hard"]},
+        "causes": _causes(plan),
         "icp": plan.config["registrations"]["icp"],
     },
 )
@@ -148,10 +145,8 @@ EXPLAIN = Step(
         "other_registrations": lambda plan, wildcards: [
             f"registrations/{name}/seed{{seed}}.npz" for name in _other_sources(plan, wildcards)
         ],
-        "all_hard": lambda plan, wildcards: _of_all(HARD_FILE) if HARD in _controls_of(plan, wildcards)[0] else [],
-        "all_hard_reenactments": lambda plan, wildcards: (
-            _of_all(HARD_REENACTED) if HARD in _controls_of(plan, wildcards)[0] and _reenacted(plan) else []
-        ),
+        "all_hard": lambda plan, wildcards: _of_all_hard(plan, wildcards, HARD_FILE),
+        "all_hard_reenactments": lambda plan, wildcards: _of_all_hard(plan, wildcards, HARD_REENACTED, REENACTED),
         "encoder": "encoders/{source}/{control_embedding}/seed{seed}.pt",
         "embeddings": "embeddings/{source}/{control_embedding}/none/seed{seed}.npz",
         "retrained_embeddings": lambda plan, wildcards: [
@@ -204,8 +199,6 @@ def read_controls(files: Paths) -> Frame:
 
 def auroc_error(rows: Frame, weights_B_N: np.ndarray) -> np.ndarray:
     """Area (B,) under the ROC curve by which the entropy separates wrong from right; NaN where it cannot."""
-    from gpca.causes.judged import ranking
-
     return ranking(rows["entropy"].to_numpy(), ~rows["right"].to_numpy(), weights_B_N)["area"]
 
 
@@ -215,17 +208,14 @@ def collect(run: Run, files: Paths) -> Frame:
 
     ``concept`` is ``all``, and for transfer the source that was trained on.
     """
-    records = []
+    records: list[tuple] = []
     keys = ["control", "source", "trained_on", "explainer", "seed"]
     for (control, source, trained_on, explainer, seed), rows in read_controls(files).groupby(keys, sort=False):
         concept = trained_on if control == TRANSFER else ALL
         values = {"accuracy": rows["right"].mean(), TEST_SAMPLES: len(rows)}
         values[AUROC] = auroc_error(rows, np.ones((1, len(rows))))[0]
-        records += [
-            (control, source, explainer, metric, concept, seed, float(value))
-            for metric, value in values.items()
-            if np.isfinite(value)
-        ]
+        finite = [(metric, float(value)) for metric, value in values.items() if np.isfinite(value)]
+        records += [(control, source, explainer, metric, concept, seed, value) for metric, value in finite]
     return tidy(records, "controls")
 
 
@@ -236,11 +226,10 @@ Values = dict[str, np.ndarray]  # metric -> values (1 + B,)
 def collect_intervals(run: Run, files: Paths) -> Frame:
     """Accuracy and AUROC of every control and explainer over all seeds, with differences, by source and over all.
 
-    Of transfer there is a row for each source trained on, and one for all others together. Draws of families and seeds
-    are the same for all explainers and controls of a source, so that differences are paired. Against ``usual``: the
-    paper's protocol on the same seeds. Against ``rival`` and ``trivial``:
-    the best other explainer, and the best trivial one, under the same control. ICP calls are those under
-    the paper's protocol.
+    Of transfer there is a row for each source trained on, and one for all others together. Explainers and controls of a
+    source share the draws of families and seeds. Against ``usual``: the paper's protocol on the same seeds; ``rival``
+    and ``trivial``: the best other and the best trivial explainer under the same control. ICP calls are those under the
+    paper's protocol.
     """
     predictions = read_controls(files)
     sources = list(dict.fromkeys(predictions["source"]))
@@ -253,17 +242,14 @@ def collect_intervals(run: Run, files: Paths) -> Frame:
             masks: dict[tuple[str, str], np.ndarray] = {}  # control, and `all` or the source trained on -> (N,)
             for control in rows["control"].unique():
                 mask_N = (rows["control"] == control).to_numpy()
-                if control == TRANSFER and source != POOLED:
-                    for other in rows["trained_on"][mask_N].unique():
-                        masks[control, other] = mask_N & (rows["trained_on"] == other).to_numpy()
+                for other in rows["trained_on"][mask_N].unique() if control == TRANSFER and source != POOLED else ():
+                    masks[control, other] = mask_N & (rows["trained_on"] == other).to_numpy()
                 masks[control, POOLED if control == TRANSFER else ALL] = mask_N
             for key, mask_N in masks.items():
                 same = (rows["control"] == PAPER) & rows["seed"].isin(rows["seed"][mask_N])
                 same &= rows["source"].isin(rows["source"][mask_N])
-                usual_values = _values(rows[same], draws.subset(same.to_numpy()))
-                group_draws = draws.subset(mask_N)
-                group = measured.setdefault(key, {})
-                group[str(explainer)] = _values(rows[mask_N], group_draws), group_draws, usual_values
+                usual_values, own = _values(rows[same], draws.subset(same.to_numpy())), draws.subset(mask_N)
+                measured.setdefault(key, {})[str(explainer)] = _values(rows[mask_N], own), own, usual_values
         for explainer in subset["explainer"].unique():
             for (control, trained_on), group in measured.items():
                 if explainer in group:

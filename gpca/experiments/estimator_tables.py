@@ -7,10 +7,8 @@ from typing import Any
 
 from gpca.alignment.methods.registry import method_entry
 from gpca.declarations import Frame, Run, table
-from gpca.evaluation.intervals import REPEATS
 from gpca.experiments import estimators
 from gpca.reporting.sheet import Cell, Column, Row, Sheet, crossed, interval_cell, plain_cell, rows_where, with_label
-from gpca.reporting.words import plural
 from gpca.uncertainty.estimates import KINDS
 from gpca.uncertainty.estimators.registry import estimator_entry
 
@@ -53,9 +51,8 @@ def _count(values: Frame, metric: str) -> Cell | None:
     SECTION,
     "Table XII: estimators of uncertainty",
     """What each estimator says about the same registrations, judged by what it models. A reference is a set of further
-    registrations of the same situation: from other starts, of other data (the surfaces sampled again, with other
-    noise and other outliers), or both. The paper uses Monte-Carlo over the starts alone. Registrations that failed
-    stand apart.""",
+    registrations of the same situation: from other starts, as in the paper, of other data (the surfaces sampled again,
+    with other noise and outliers), or both.""",
     **INTERVALS,
 )
 def table12_uncertainty(run: Run, intervals):
@@ -79,18 +76,14 @@ def table12_uncertainty(run: Run, intervals):
         if set(rows_where(intervals, method=method, estimator=name)["metric"]) == {"no_estimate"}
     ]
     notes = (
-        f"n: registrations with an estimate, of all datasets and {plural(sheet.seeds, 'seed')}. In "
-        f"brackets: the 95 % interval of a bootstrap over families of objects and seeds ({REPEATS} draws); of a "
-        "divergence it is left out where it is wider than the value, and the CSV holds it. Failed: an error of "
-        f"{100 * run.config['success']['error']:g} % of the diameter or more.",
+        f"n: registrations with an estimate, of all datasets. {sheet.over()}; a divergence has no interval wider than "
+        f"its value. Failed: an error of {100 * run.config['success']['error']:g} % of the diameter or more.",
         f"Each estimator is judged by {run.config['estimator_pairs']['repeats']} further registrations, between "
-        "which varies what it models: other starts; other data, which is the surface sampled again with other "
-        "noise and other outliers; or both, also for one that models the error. A posterior is judged by other "
-        "data, as a right one is about as wide as the results of these.",
-        "KL: from the covariance of those results. NNE, NEES / 6 and coverage: of those results about their mean. "
-        "The first two are near 1 and the coverage is 95 % if the covariance is theirs; above 1, or below 95 %, an "
-        "estimator is overconfident. KL, NNE and NEES are trimmed means (10 to 90 %). True pose: these of the "
-        "error, which also has what moves all runs alike. Bold: least divergence of a method and state.",
+        "which varies what it models: other starts; other data; or both, also for one that models the error. A "
+        "posterior is judged by other data, as a right one is about as wide as the results of these.",
+        "KL: from the covariance of those results. NNE, NEES / 6 and coverage: of those results about their mean; "
+        "NNE and NEES / 6 above 1, or coverage below 95 %, are overconfident. KL, NNE and NEES are trimmed means (10 "
+        "to 90 %). True pose: these of the error. Bold: least divergence of a method and state.",
         *([f"Left out, as they refuse every registration: {'; '.join(refused)}."] if refused else []),
     )
     caption = "What estimators say of the covariance of a pose, by what they model" + run.stand_ins()
@@ -125,20 +118,13 @@ def table12_references(run: Run, intervals):
     succeeded = rows_where(intervals, state=estimators.SUCCEEDED)
     sheet = Sheet("table12_references", heads, rows, columns, succeeded, more=cells)
     notes = (
-        f"Each reference: {run.config['estimator_pairs']['repeats']} registrations of the same situation, with "
-        "other starts, other data, or both. KL in nats, coverage and intervals are as in Table XII. Bold: least "
-        "divergence of a method, the references apart. The references' own rows say how much of the error each "
+        f"Each reference: {run.config['estimator_pairs']['repeats']} registrations. KL in nats; intervals as in Table "
+        "XII. Bold: least divergence of a method, the references apart. Their own rows say how much of the error each "
         "kind of repetition sees.",
     )
     caption = "Estimators against every kind of reference, registrations that succeeded" + run.stand_ins()
-    return sheet.table(
-        caption,
-        "metric",
-        notes,
-        bold=[metric for metric in columns if metric.startswith("kl_")],
-        same=1,
-        keep_empty=True,
-    )
+    bold = [metric for metric in columns if metric.startswith("kl_")]
+    return sheet.table(caption, "metric", notes, bold=bold, same=1, keep_empty=True)
 
 
 @table(
@@ -186,8 +172,7 @@ def table12_failures(run: Run, intervals, seconds):
     notes = (
         "Spread: root mean square distance by which the points of the object would move. Lead: AUROC minus that of "
         "the best other gate (inlier RMSE, fitness, spread of Monte-Carlo's starts) on the same registrations and "
-        "the same draws; an estimator tells more than a gate where the interval is above 0. Intervals as in Table "
-        "XII. Spearman: of the spread and the error. Bold: best of a method.",
+        "the same draws. Intervals as in Table XII. Spearman: of the spread and the error. Bold: best of a method.",
         "None: refused, or failed for a reason that the files name. ms: of one estimate, with descriptors, without "
         "learning; the one column that differs from run to run.",
     )

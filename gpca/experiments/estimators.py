@@ -55,10 +55,7 @@ def _asked(plan: Plan) -> list[str]:
 ESTIMATE = Step(
     name="estimate",
     run="gpca.steps.estimates",
-    inputs={
-        "objects": "objects/{source}.npz",
-        "causes": "causes/{source}/seed{*seed}.npz",
-    },
+    inputs={"objects": "objects/{source}.npz", "causes": "causes/{source}/seed{*seed}.npz"},
     outputs={
         "rows": "estimates/{source}/{*estimate}/seed{*seed}.csv",
         "timings": "timings/{source}/estimator_{*estimate}/seed{*seed}.csv",
@@ -121,14 +118,9 @@ def collect_intervals(_run: Run, files: Paths) -> Frame:
     """
     import pandas as pd
 
-    together = pd.concat(
-        [
-            rows.assign(source=source, estimator=estimator, seed=seed)
-            for (source, estimator, seed), rows in read_estimate_files(files).items()
-        ],
-        ignore_index=True,
-    )
-    records: list[tuple] = []
+    keys, records = ("source", "estimator", "seed"), []
+    parts = [rows.assign(**dict(zip(keys, of, strict=True))) for of, rows in read_estimate_files(files).items()]
+    together = pd.concat(parts, ignore_index=True)
     for method, trials in together.groupby("method", sort=False):
         by_estimator = trials.groupby("estimator", sort=False)
         records += _compare(str(method), {str(name): rows.reset_index(drop=True) for name, rows in by_estimator})
@@ -154,10 +146,11 @@ def _compare(method: str, rows_of: Mapping[str, Frame]) -> list[tuple]:
                     continue
                 lead = ("", np.nan, np.nan, np.nan)
                 if metric == "auroc_failed":
-                    areas = {}
-                    for gate, scored in rivals.items():
-                        score_N = scored["spread"].fillna(np.inf).to_numpy()
-                        areas[gate] = ranking(score_N, known["failed"].to_numpy(), draws.weights * has_N)["area"]
+                    score_of = {gate: each["spread"].fillna(np.inf).to_numpy() for gate, each in rivals.items()}
+                    weights_B_N, failed_N = draws.weights * has_N, known["failed"].to_numpy()
+                    areas = {
+                        gate: ranking(score_N, failed_N, weights_B_N)["area"] for gate, score_N in score_of.items()
+                    }
                     best = max((gate for gate in areas if gate != name), key=lambda gate: areas[gate][0])
                     lead = best, *interval(value_B - areas[best])
                 enough = len(set(cluster_N[has_N])) >= FEWEST_FAMILIES
@@ -177,16 +170,11 @@ def of_state(rows: Frame) -> dict[str, np.ndarray]:
 def measure(rows: Frame, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
     """Metrics (B,) of registrations by their weights (B, N); NaN where one is not defined.
 
-    Of each kind of reference, and of the true pose (`truth`) but for the divergences:
-
-    - kl_rotation, kl_translation: KL divergence of the estimate from the reference, nats, trimmed mean.
-    - nne: √ of the trimmed mean of |e|² / tr Σ, the normalized norm error; 1 is right, more is too sure.
-    - nees: trimmed mean of eᵀΣ⁻¹e / 6; 1 is right, more is too sure.
-    - coverage: share of the results, or of the true poses, within the 95 % region of Σ.
-
-    Of all: no_estimate, the share that it refused or failed at, which the others leave out; test_samples, all of them.
-    With registrations of both states: auroc_failed, how well the predicted spread tells failed registrations from the
-    others; spearman_error, of spread and error, unweighted.
+    Of each kind of reference, and of the true pose (`truth`) but for the divergences: kl_rotation and kl_translation,
+    nats, of the estimate from the reference; nne, √ of |e|² / tr Σ, and nees, eᵀΣ⁻¹e / 6, of which 1 is right and more
+    is too sure; coverage, the share of the results, or of the true poses, within the 95 % region of Σ. All but the
+    last are trimmed means. no_estimate is the share that it refused or failed at, which the others leave out;
+    spearman_error is unweighted.
     """
     from scipy.stats import chi2, spearmanr
 

@@ -1,10 +1,10 @@
 """The explainers of an experiment: those of its section of the config, with settings beyond those of ``explainers``."""
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from gpca.errors import with_key
-from gpca.explainers.registry import CONCEPTS, explainer_entry, require_settings
+from gpca.explainers.registry import CONCEPTS, require_settings
 
 
 def require_explained(config: Mapping[str, Any], key: str) -> Iterator[tuple[str, str]]:
@@ -18,11 +18,6 @@ def require_explained(config: Mapping[str, Any], key: str) -> Iterator[tuple[str
     for name, settings in explainer_settings(config, section).items():
         with_key(f"{key}.{name}", require_settings, name, settings, CONCEPTS, key == "controls.explainers")
         yield f"{key}.{name}", name
-
-
-def titles(names: Collection[str]) -> dict[str, str]:
-    """Return the titles of explainers by name."""
-    return {name: explainer_entry(name).title for name in names}
 
 
 def explainer_settings(config: Mapping[str, Any], explainers: Mapping[str, Mapping | None]) -> dict[str, dict]:

@@ -14,7 +14,6 @@ from gpca.causes.judged import CEILING, MEASURES, Judged, ceiling_of, joined, ju
 from gpca.causes.truth import BORDERLINE, FAILED, GEOMETRY, NOMINAL, Truth
 from gpca.declarations import Experiment, Frame, Paths, Plan, Run, Step, numbers, table
 from gpca.encoders.registry import encoder_module
-from gpca.errors import InputError
 from gpca.evaluation.intervals import FEWEST_FAILURES, REPEATS, Clustered, pigeonhole_weights
 from gpca.evaluation.measures import ALL, intervals
 from gpca.experiments import cause_tables as tables
@@ -53,11 +52,10 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 EXPERIMENT = Experiment(name="frame_causes", names=names)
 
 
-def _asked(plan: Plan, explainers: Iterable[str]) -> dict[str, Any]:
+def _asked(plan: Plan, names: Iterable[str]) -> dict[str, Any]:
     """Settings of a job that asks some explainers of causes about depth frames."""
-    section = plan.config["diagnosis"]
-    asked = {"explainers": {name: section["explainers"][name] for name in explainers}}
-    return section | {"icp": plan.config["registrations"]["icp"]} | asked
+    section, icp = plan.config["diagnosis"], plan.config["registrations"]["icp"]
+    return section | {"icp": icp, "explainers": {name: section["explainers"][name] for name in names}}
 
 
 def _inside(plan: Plan) -> list[str]:
@@ -116,19 +114,16 @@ def collect(
 ) -> Frame:
     """Measures of explainers that learned from no frame, with intervals; the source is ``real_rgbd/{kind of start}``.
 
-    An instance counts once in a measure, however many starts and seeds it has, and intervals are over scenes, since
-    frames of one scene are alike. Beside the measures stands the number of `SAMPLES`. Counts, of `COUNTED`, are of
-    starts, and also those of each dataset, ``real_rgbd/{kind}/{dataset}``. Scenes whose truth was made by ICP are
-    counted as `PSEUDO` and measure nothing. Files of causes, samples and predictions are in the same order of seeds.
+    An instance counts once in a measure, however many starts and seeds it has, and intervals are over scenes. Counts,
+    of `COUNTED`, are of starts, also of each dataset, ``real_rgbd/{kind}/{dataset}``. Scenes whose truth was made by
+    ICP are counted as `PSEUDO` and measure nothing. Files are in the same order of seeds.
     """
     import pandas as pd
 
     samples_of: dict[str, list[Judged]] = {}
     tested: list[Frame] = []
-    outside, files = list(outside_files), [list(each) for each in (causes_files, sample_files, prediction_files)]
-    if not files[0] or len(set(map(len, files))) > 1:
-        raise InputError("causes of frames", "need files of every seed", "give the same number of each kind")
-    for causes_file, sample_file, prediction_file in zip(*files, strict=True):
+    outside = list(outside_files)
+    for causes_file, sample_file, prediction_file in zip(causes_files, sample_files, prediction_files, strict=True):
         causes, seed = Causes.load(causes_file), seed_of_file(causes_file)
         samples = read_csv(sample_file, SAMPLE_COLUMNS, others=ANY)
         samples = samples[[name for name in samples if name in SAMPLE_COLUMNS or name.startswith(FAILED_BY)]]
@@ -148,11 +143,11 @@ def collect(
         source = f"{REAL_WORLD}/{kind}"
         of_datasets = {f"{source}/{dataset}": subset for dataset, subset in starts.groupby("dataset")}
         for name, subset in ({source: starts} | of_datasets).items():
-            counts = count_ends(subset, ("instance", "scene", "object"), "starts")
-            sizes = subset["seed"].nunique(), counts["scenes"], len(subset)
+            ends = count_ends(subset, ("instance", "scene", "object"), "starts")
+            sizes = subset["seed"].nunique(), ends["scenes"], len(subset)
             records += [
-                (TABLE, name, TRUTH, f"count_{each}", ALL, "", "", *sizes, float(counts[each]), np.nan, np.nan)
-                for each in (*COUNTED, *failures_by_method(subset, counts))
+                (TABLE, name, TRUTH, f"count_{each}", ALL, "", "", *sizes, float(count), np.nan, np.nan)
+                for each, count in ({each: ends[each] for each in COUNTED} | failures_by_method(subset)).items()
             ]
         if kind == PSEUDO:
             continue
@@ -183,16 +178,13 @@ def count_ends(samples: Frame, things: Iterable[str], whole: str) -> Counter[str
     return counts
 
 
-def failures_by_method(samples: Frame, counts: Counter[str]) -> list[str]:
-    """Add the numbers of samples whose own error is too large by each method and by any, and in how many scenes."""
+def failures_by_method(samples: Frame) -> dict[str, int]:
+    """Numbers of samples whose own error is too large by each method and by any, and in how many scenes."""
     failed = samples[[name for name in samples if name.startswith(FAILED_BY)]] == "True"
     if failed.empty:
-        return []
-    any_N = failed.any(axis=1)
-    counts.update({name: int(failed[name].sum()) for name in failed})
-    more = {"failures": int(failed.to_numpy().sum()), "failed_scenes": samples["scene"][any_N].nunique()}
-    counts.update(more)
-    return [*failed, *more]
+        return {}
+    scenes = samples["scene"][failed.any(axis=1)].nunique()
+    return {**failed.sum(), "failures": failed.to_numpy().sum(), "failed_scenes": scenes}
 
 
 def counts_in(rows: Frame) -> dict[str, int]:
@@ -227,9 +219,8 @@ MEASURED = {
     tables.SECTION,
     "Table IX on depth frames: nothing was perturbed",
     """Registrations of depth frames as they come: the sensor's own noise, what stands in front, and poses that
-    estimators gave in that very image, in a neighboring one or elsewhere; beside these, the true pose with errors
-    of fixed sizes. Their causes are measured as well, since mesh, pose and camera are known; the explainers have
-    learned from the simulated ones alone. Where fewer than 30 failed, nothing is concluded.""",
+    estimators gave in that image, in a neighboring one or elsewhere; beside these, the true pose with errors of fixed
+    sizes. The explainers have learned from simulated causes alone.""",
     after="table9_causes",
     intervals="frame_causes.csv",
 )
@@ -263,11 +254,9 @@ def table9_frames(run: Run, intervals):
         "each cause by itself.",
         "An instance counts once, whatever its number of starts. In brackets: the 95 % interval of "
         f"{REPEATS} bootstrap draws over scenes. Bold: best of these starts.",
-        "State: mean share of the nominal and of the failed that is called so. Over trivial, lead: State minus "
-        "that of the best trivial row and of the best other row, on the same draws. n: starts that are nominal "
-        "or failed. The others as in Table IX. The rule counts points against the part of the model that the "
-        "camera would see, which is not what it was made for: here it is a control. A re-enactment also reads "
-        "the mesh, the camera and the pixels of the object.",
+        "State: mean share of the nominal and of the failed that is called so. Over trivial, lead: State minus that "
+        "of the best trivial row and of the best other row, on the same draws. n: starts that are nominal or failed. "
+        "The others as in Table IX. A re-enactment also reads the mesh, the camera and the pixels of the object.",
         tables.COST_NOTE,
     )
     frames = title_of_frames(run.config)
@@ -299,13 +288,11 @@ def table9_frame_counts(run: Run, intervals):
     titles |= {FAILED_BY + name: f"Off by {method_entry(name).title}" for name in methods if name != "scenes"}
     titles |= {"failures": "Off, all methods", "failed_scenes": "in scenes"} if methods else {}
     notes = (
-        "Every estimator's pose of an instance is a start by itself. By a cause: it adds most to the error, as "
-        "Table IX measures it. Without a cause: off even with every cause removed; not among the failed.",
+        "By a cause: it adds most to the error. Without a cause: off even with every cause removed; not among the "
+        "failed.",
         MISSED_NOTE,
         "Off by a method: its one registration from that start ends more than the limit of a failure away. Failed is "
-        "the mean over starts around it.",
-        "Truth made by ICP: the true poses were found by ICP themselves, so these test no ICP and are counted here "
-        "alone.",
+        "the mean over starts around it. Truth made by ICP: these test no ICP and are counted here alone.",
     )
     caption = f"What became of registrations of depth frames: {title_of_frames(run.config)}"
     heads = {"start": "Starts", "dataset": "Dataset"}

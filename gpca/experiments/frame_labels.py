@@ -95,8 +95,8 @@ ENDS = {  # columns beside the labels to the targets
     "IV-E Real-world validation",
     "Depth frames: labels needed for a new concept",
     """How many labels a classifier needs on depth frames, chosen by BALD with k-means or at random, to the paper's
-    target of 70 % and to its neighbors (Sec. IV-E): on the embeddings of DGCNN, the paper's backbone, beside those
-    of another, and on measurements of the pair. In bold is the strategy that needs fewer labels.""",
+    target of 70 % and to its neighbors (Sec. IV-E): on the embeddings of two backbones and on measurements of the
+    pair.""",
     after="confusion_real_world",
     metrics="real_world.csv",
 )
@@ -120,14 +120,12 @@ def table6_labels(run: Run, metrics: Frame) -> Table:
         sheet.compare_across([f"{strategy}_{percent}" for strategy in STRATEGIES])
     new = " or ".join(section["held_out"])
     notes = (
-        f"{mean_over(sheet.seeds, frames['test'])}. Bold: the fewer labels of the two to a target, "
-        "whether or not their intervals overlap; neither where they are equal.",
+        f"{mean_over(sheet.seeds, frames['test'])}. Bold: the fewer labels of the two to a target.",
         f"Start: {section['initial']} labeled samples of the two known concepts. Pool: their other training "
         f"samples, of {frames['train']} with those of the new concept, and as many of the new one as make up "
         f"{100 * section['share']:g} % of it. The paper's classifier is fitted anew in each round, as in Table "
-        f"III, until all targets are reached, to {section['least']} labels at least and {section['labels']} "
-        "at most; '>': some runs did not reach the target. Encoders saw every concept.",
-        "All labels: of a classifier that learns the whole pool. DGCNN's row is compared with the paper's numbers.",
+        f"III, to {section['least']} labels at least and {section['labels']} at most; '>': some runs did not reach "
+        "the target. Encoders saw every concept. All labels: of a classifier that learns the whole pool.",
     )
     caption = f"Labels until a GPC to which {new} is new is as accurate on {title_of_frames(run.config)}"
     return sheet.table(caption, "quantity", notes, keep_empty=True)

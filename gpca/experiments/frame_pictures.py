@@ -20,13 +20,7 @@ from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import FRAME_COLUMNS, Registrations
 from gpca.reporting.figures.cloud_views import legend_of_clouds
 from gpca.reporting.figures.panels import panels, write_below
-from gpca.reporting.figures.style import (
-    BLACK,
-    SOURCE_COLOR,
-    TARGET_COLOR,
-    YELLOW,
-    write_title,
-)
+from gpca.reporting.figures.style import BLACK, SOURCE_COLOR, TARGET_COLOR, YELLOW, write_title
 from gpca.reporting.words import BOP_TITLES, object_of_frames
 from gpca.rigid import inverse, transform
 

@@ -8,7 +8,6 @@ from gpca.encoders.registry import make_encoder, parameter_count
 from gpca.evaluation.intervals import TRIVIAL
 from gpca.evaluation.measures import ALL
 from gpca.experiments import frames
-from gpca.experiments.explained import titles
 from gpca.experiments.frame_accuracies import DATASET, SEEN, UNSEEN
 from gpca.experiments.frames import CLASSIC, REDUCTIONS, TOGETHER, title_of_frames
 from gpca.explainers.registry import explainer_entry
@@ -37,8 +36,7 @@ NOT_SHARES = {  # of which there is one number for all samples
     "Table VI: backbones and reductions",
     """Table VI of the paper: accuracy of GP-CA on objects in depth frames, by encoder and by reduction of the
     embedding, with the paper's classic features below. Beside each share are its interval and the standard
-    deviation over the seeds, which the paper prints. In the full protocol, encoders as published stand below the
-    judged ones.""",
+    deviation, which the paper prints.""",
     paper=True,
     **NUMBERS,
 )
@@ -48,7 +46,9 @@ def table6_backbones(run: Run, intervals, metrics):
         {name: frames.BACKBONES.get(name, name) for name in names}
         for names in (section["backbones"], section["published"].values())
     )
-    untrained = {name: title for name, title in titles(section["explainers"]).items() if name in TRIVIAL}
+    untrained = {
+        name: title for name, title in run.titles(explainer_entry, section["explainers"]).items() if name in TRIVIAL
+    }
     of_frames = {"table": TOGETHER, "source": REAL_WORLD}
     rows = [
         Row(
@@ -129,9 +129,8 @@ def table6_seen_unseen(run: Run, intervals, metrics):
     poses |= {f"{REAL_WORLD}_{name}": entry for name, entry in conditions_of(run.config).items()}
     conditions = {name: POSES.get(entry.get("form", ""), GLOBAL_POSE) for name, entry in poses.items()}
     embedded = (*frames.reduced_backbones(section), *frames.published_backbones(section))
-    methods = (
-        {name: frames.encoder_title(*name.split("-")) for name in embedded} | CLASSIC | titles(section["explainers"])
-    )
+    methods = {name: frames.encoder_title(*name.split("-")) for name in embedded} | CLASSIC
+    methods |= run.titles(explainer_entry, section["explainers"])
     rows = []
     for row in crossed(("source", conditions), ("method", methods)):
         method = row.where["method"]

@@ -177,8 +177,7 @@ COLUMNS_OF_SHIFT = {
     "Table XIX: a guarantee for what is stated about causes",
     """A set that holds the true state, which is nominal, one cause, or several, as often as is guaranteed; and an alarm
     that reports good, failed or not sure, and seldom errs. Explainers are trained on some families of shapes,
-    calibrated on others, and tested on a family that is among neither. A guarantee by sample may break there; that by
-    family cannot, if families are exchangeable, but its sets are larger.""",
+    calibrated on others, and tested on a family that is among neither, where a guarantee by sample may break.""",
     **INPUT,
 )
 def table19_guarantee(run: Run, measured):
@@ -197,9 +196,9 @@ def table19_guarantee(run: Run, measured):
             f"failed called good (Missed failures) and {false_alarms} % of the nominal called failed (False alarms), "
             f"by family {family_risk} % each.",
             "States: nominal, one cause, or several. None: the most probable states until their scores add up to the "
-            "guaranteed share, and one threshold that misses as many of the failed in training as is guaranteed, or "
-            "0.5 where nothing is trained. By sample: the guarantee holds if single samples are exchangeable. By "
-            f"family: if families are. A set of {len(STATES)} states, or an alarm that is never sure, states nothing.",
+            "guaranteed share, and one threshold set in training, or 0.5. By sample: guaranteed if samples are "
+            f"exchangeable; by family: if families are. A set of {len(STATES)} states, or an alarm that is never sure, "
+            "states nothing.",
             "Families: smallest number of calibration families of a tested one. n: tested samples without borderline "
             f"ones, of {int(pooled['clusters'].max())} families. {sheet.over()}.",
         ],
@@ -235,8 +234,7 @@ def table19_shift(run: Run, measured):
         [
             f"The limits are those of Table XIX, by sample: {level} % coverage, at most {missed} % missed failures and "
             f"{false_alarms} % false alarms. Nothing guarantees them here: the numbers show what is left.",
-            "Each state: limits for each state by itself. Severity: the largest of the severities of noise, rotation, "
-            "translation and crop, as shares of the largest in any sample; nominal and failed samples are halved "
+            "Each state: limits for each state by itself. Halves: by the largest severity, nominal and failed samples "
             "separately. All starts of an instance in depth frames have the weight of one sample, intervals are over "
             f"scenes, and fewer than {FEWEST_FAILURES} samples of a kind are not shown.",
         ],

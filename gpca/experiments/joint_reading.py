@@ -28,28 +28,17 @@ DevelopmentSeed = Annotated[int, Bounds(minimum=100)]  # no other run has them
 
 @dataclass(frozen=True, kw_only=True)
 class Section:
-    """How a joint reading is searched.
+    """How a joint reading is searched."""
 
-    Attributes:
-        source: name of the development objects, in no row of any table.
-        objects: where they come from, as an entry of `sources`.
-        stands_for: the source whose printed numbers it is compared with.
-        seeds: those of development; none for a run without a joint reading.
-        samples: test samples of each source and seed on which Monte-Carlo ICP is run, balanced, at most.
-        batch, labels: labels of a round, and in all.
-        deals: number of permutations of the printed numbers, for the chance.
-        choices: the values of each choice, the protocol's first.
-    """
-
-    source: Name
+    source: Name  # of the development objects, in no row of any table
     objects: SourceEntry
-    stands_for: Name
-    seeds: tuple[DevelopmentSeed, ...]
-    samples: Annotated[int, Bounds(minimum=3, multipleOf=3)]
-    batch: Count
-    labels: Count
-    deals: Count
-    choices: joint.Grid
+    stands_for: Name  # the source whose printed numbers it is compared with
+    seeds: tuple[DevelopmentSeed, ...]  # of development; none for a run without a joint reading
+    samples: Annotated[int, Bounds(minimum=3, multipleOf=3)]  # of each source and seed for Monte-Carlo ICP, at most
+    batch: Count  # labels of a round
+    labels: Count  # in all
+    deals: Count  # permutations of the printed numbers, for the chance
+    choices: joint.Grid  # values of each choice, the protocol's first
 
 
 def check(config: dict, _left_out: LeftOut) -> None:

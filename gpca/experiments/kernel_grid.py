@@ -111,12 +111,21 @@ HEADS = {"kernel": "Kernel", "learning_rate": "Rate", "iterations": "Iterations"
     intervals="kernel_intervals.csv",
 )
 def table4_kernels(run: Run, intervals):
-    rows = [Row(labels(setting), {"method": setting_name(*setting)}) for setting in PRINTED]
+    rows = [
+        Row(
+            [(kernel, TITLES[kernel]), *((f"{number:g}",) * 2 for number in schedule)],
+            {"method": setting_name(*setting)},
+        )
+        for setting in PRINTED
+        for kernel, *schedule in [setting]
+    ]
     columns = {name: show("accuracy", title, where={"source": name}) for name, title in titles(run).items()}
     sheet = Sheet("table4_kernels", HEADS, rows, columns, intervals)
-    caption = "Accuracy of the GPC by kernel and schedule (%)" + stand_ins(run, intervals)
+    shown = [name for name in columns if (intervals["source"] == name).any()]
+    caption = "Accuracy of the GPC by kernel and schedule (%)" + run.stand_ins(shown, partly=False)
+    cell = next(cell for cell in sheet.cells.values() if cell.test_samples)
     note = "The rows that the paper prints; kernels.csv has all combinations, with confidence and calibration."
-    return sheet.table(caption, "source", [f"{over(sheet)}.", note], bold=columns)
+    return sheet.table(caption, "source", [f"{sheet.over(cell.test_samples // cell.seeds)}.", note], bold=columns)
 
 
 @figure(
@@ -140,24 +149,21 @@ def kernel_learning_curves(run: Run, grid) -> Figure:
     rates = sorted(grid["learning_rate"].unique(), reverse=True)
     ticks = sorted(grid["iterations"].unique())
     for column, (source, title) in enumerate(shown.items()):
-        rows_of_source = grid[grid["source"] == source]
-        means = rows_of_source.groupby([*SETTING])[list(CURVES)].mean()
+        means = grid[grid["source"] == source].groupby([*SETTING])[list(CURVES)].mean()
         for row, measure in enumerate(CURVES):
             panel = axes[row, column]
             by_kernel = means[measure].groupby(level=["kernel", "learning_rate"])
             for (kernel, rate), curve in sorted(by_kernel, key=lambda item: list(WIDTHS).index(item[0][0])):
-                iterations = curve.index.get_level_values("iterations")
-                line = LINES[rates.index(rate) % len(LINES)]
-                panel.plot(iterations, 100 * curve, color=COLORS[kernel], linestyle=line, linewidth=WIDTHS[kernel])
+                look = {"color": COLORS[kernel], "linestyle": LINES[rates.index(rate)], "linewidth": WIDTHS[kernel]}
+                panel.plot(curve.index.get_level_values("iterations"), 100 * curve, **look)
             for setting in PRINTED:
                 if setting in means.index:
                     marker = {"color": COLORS[setting[0]], "markerfacecolor": "white", "markersize": 5}
                     panel.plot(setting[2], 100 * means.loc[setting, measure], "o", clip_on=False, zorder=5, **marker)
             for (kernel, rate, iterations), value in printed_accuracies(source).items():
                 if measure == "accuracy" and (kernel, rate, iterations) in means.index:
-                    symbol = PRINTED_MARKERS[int(rate < rates[0])]
                     filled = {"color": COLORS[kernel], "markersize": 3.5, "clip_on": False}
-                    panel.plot(BESIDE[kernel] * iterations, value, symbol, **filled)
+                    panel.plot(BESIDE[kernel] * iterations, value, PRINTED_MARKERS[int(rate < rates[0])], **filled)
             panel.set_xscale("log")
             panel.set_xticks(ticks, [f"{tick}" for tick in ticks])
             panel.xaxis.set_minor_locator(NullLocator())
@@ -169,11 +175,13 @@ def kernel_learning_curves(run: Run, grid) -> Figure:
     kernels = [kernel for kernel in COLORS if (grid["kernel"] == kernel).any()]
     looks: list[dict[str, Any]] = [
         *({"label": TITLES[name], "color": COLORS[name], "linewidth": WIDTHS[name]} for name in kernels),
-        *({"label": f"rate {rate:g}", "linestyle": LINES[i % len(LINES)]} for i, rate in enumerate(rates)),
+        *({"label": f"rate {rate:g}", "linestyle": line} for rate, line in zip(rates, LINES, strict=False)),
         {"label": "row of Table IV", "marker": "o", "markerfacecolor": "white", "linestyle": ""},
+        *(
+            {"label": f"paper, rate {rate:g}", "marker": symbol, "linestyle": "", "markersize": 3.5}
+            for symbol, rate in zip(PRINTED_MARKERS, rates, strict=False)
+        ),
     ]
-    for symbol, rate in zip(PRINTED_MARKERS, rates, strict=False):
-        looks.append({"label": f"paper, rate {rate:g}", "marker": symbol, "linestyle": "", "markersize": 3.5})
     legend_below(drawing, [Line2D([], [], **{"color": GRAY} | look) for look in looks], columns=3)
     return drawing
 
@@ -200,17 +208,3 @@ def printed_accuracies(source: str) -> dict[tuple[str, float, int], float]:
 
 def titles(run: Run) -> dict[str, str]:
     return {name: title for name, title in run.source_titles.items() if name in run.config["kernel_grid"]["sources"]}
-
-
-def labels(setting: tuple) -> list[tuple[str, str]]:
-    kernel, rate, iterations = setting
-    return [(kernel, TITLES[kernel]), (f"{rate:g}", f"{rate:g}"), (str(iterations), str(iterations))]
-
-
-def over(sheet: Sheet) -> str:
-    cell = next(cell for cell in sheet.cells.values() if cell.test_samples)
-    return sheet.over(cell.test_samples // cell.seeds)
-
-
-def stand_ins(run: Run, intervals: Frame) -> str:
-    return run.stand_ins([name for name in titles(run) if (intervals["source"] == name).any()], partly=False)

@@ -105,7 +105,7 @@ def test_table3_shows_the_papers_experiment_alone_its_conditions_and_lower_bound
     assert f"| YCB | all concepts | **16 ± 10** | – | > 48 | {AT_96} |" in markdown
     assert "| YCB | the known concepts only | – | – | > 60 |" in markdown
     assert "LINEMOD" not in markdown
-    judged = ("(rbf, rate 0.01, 100 passes)", "at least 60 (then 10 a round), at most 550 or the whole pool")
+    judged = ("(rbf, rate 0.01, 100 passes)", "labels, of 10 from 60 on, at most 550.")
     for words in ("120 labeled samples", "680 training samples", "4 labels a round, 60 in all", *judged):
         assert words in markdown
     assert "Mean over 3 seeds, 200 test samples each" in markdown

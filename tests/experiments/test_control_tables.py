@@ -17,9 +17,9 @@ COLUMNS = [*KEYS, *AGAINST, *NUMBERS]
 
 @pytest.fixture(autouse=True)
 def _titles(monkeypatch):
-    monkeypatch.setattr("gpca.experiments.control_tables.titles", lambda names: {name: TITLES[name] for name in names})
     monkeypatch.setattr(
-        "gpca.experiments.control_tables.explainer_entry", lambda name: SimpleNamespace(sight=SEES[name])
+        "gpca.experiments.control_tables.explainer_entry",
+        lambda name: SimpleNamespace(sight=SEES[name], title=TITLES[name]),
     )
 
 
