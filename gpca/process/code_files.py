@@ -1,7 +1,6 @@
 """The source files that a step depends on, as inputs of its rule: Snakemake does not track imported modules."""
 
 import ast
-import hashlib
 from functools import cache
 from pathlib import Path
 
@@ -35,8 +34,9 @@ def code_files(*modules: str) -> list[str]:
             reached[module], imported = _imports(module)
             open_modules += imported
     files = {*reached.values()}
-    for module in BESIDE.keys() & reached:
-        files.update(map(str, Path(reached[module]).parent.glob(BESIDE[module])))
+    files |= {
+        str(file) for module in BESIDE.keys() & reached for file in Path(reached[module]).parent.glob(BESIDE[module])
+    }
     working = Path.cwd().resolve()  # as ROOT is
     seen = str(ROOT.relative_to(working) / "_")[:-1] if ROOT.is_relative_to(working) else f"{ROOT}/"
     prefixes = {f"{ROOT}/": seen, f"{working}/": ""}  # where files are -> what their names begin with
@@ -44,19 +44,15 @@ def code_files(*modules: str) -> list[str]:
     return sorted(prefixes.get(at, "") + file.removeprefix(at) for file, at in inside.items())
 
 
-NAMES: dict[str, list[str]] = {}  # by a hash of the module: parsing takes a sixth of the seconds of planning a run
-_OWN_CODE = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
 _STATEMENTS = ("body", "orelse", "finalbody", "handlers", "cases")  # where a statement holds others, as imports are
 
 
 @cache
 def _imports(module: str) -> tuple[str, tuple[str, ...]]:
     module, _, function = module.partition(":")
-    file = _file_of(module)
-    key = hashlib.sha256(f"{_OWN_CODE} {file} {function}\n".encode() + file.read_bytes()).hexdigest()
-    if key not in NAMES:
-        NAMES[key] = sorted(_names(file, module, function))
-    names = set(NAMES[key])
+    if (file := _file(module)) is None:
+        raise ModuleNotFoundError(f"there is no module {module}")
+    names = _names(file, module, function)
     top = module.split(".")[0]
     if top not in PACKAGES:  # the packages around it run first
         names |= {module.rsplit(".", depth)[0] for depth in range(1, module.count(".") + 1)}
@@ -128,12 +124,6 @@ def _is_followed(name: str, importing: str) -> bool:
     if first in PACKAGES or first == importing:
         return True
     return importing not in PACKAGES and lone_root(importing) is not None and ROOTS.get(first) == lone_root(importing)
-
-
-def _file_of(module: str) -> Path:
-    if (file := _file(module)) is None:
-        raise ModuleNotFoundError(f"there is no module {module}")
-    return file
 
 
 @cache

@@ -18,7 +18,6 @@ def stamp(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
     def forget():
-        files_of_code.NAMES.clear()
         for cached in (files_of_code._imports, files_of_code._file, code_stamps._sha256, code_stamp):
             cached.cache_clear()
 
@@ -50,14 +49,3 @@ def test_a_first_stamp_is_as_old_as_the_newest_file(stamp, tmp_path):
     for name, seconds in (("step", 1000), ("used", 2000), ("unused", 3000)):
         os.utime(tmp_path / f"gpca/{name}.py", (seconds, seconds))
     assert stamp("gpca.step").stat().st_mtime == 2000
-
-
-@pytest.mark.parametrize("text", ["", "[1]", '{"a": 3}'])
-def test_imports_that_were_kept_are_those_of_the_code_and_a_damaged_file_is_made_anew(stamp, monkeypatch, text):
-    first = stamp("gpca.step").read_text()
-    with monkeypatch.context() as patch:
-        patch.setattr(files_of_code, "_names", None)  # nothing is parsed
-        assert stamp("gpca.step").read_text() == first
-    kept = code_stamps.REMEMBERED.read_text()
-    code_stamps.REMEMBERED.write_text(text)
-    assert stamp("gpca.step").read_text() == first and code_stamps.REMEMBERED.read_text() == kept
