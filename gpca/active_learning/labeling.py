@@ -6,7 +6,7 @@ import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 
@@ -14,9 +14,9 @@ from gpca.active_learning.acquisition import Pool, select
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError, refusing
-from gpca.io.arrays import TEXT, WHOLE, load_arrays, write_arrays
+from gpca.io.arrays import TEXT, WHOLE, write_arrays
 from gpca.io.container import Container, array
-from gpca.io.files import Axes, append_row, printable, require_file, whole_file
+from gpca.io.files import append_row, printable, require_file, whole_file
 from gpca.numerals import whole
 from gpca.pairs.dataset import ragged
 from gpca.seeds import generator
@@ -24,7 +24,6 @@ from gpca.seeds import generator
 LABEL_COLUMNS = ("sample", "split", "concept")
 Key = tuple[str, int]  # split and number of a sample
 SKIPPED = ""  # concept of a sample that the person skipped
-QUEUE_VERSION = 1
 QUEUE_MARK = "queued"  # array that tells a queue from the registrations of a run
 LONGEST_NAME = 200  # characters
 LARGEST_BYTES = 10**7  # of labels or answers
@@ -51,18 +50,10 @@ class Queue(Container):
         """Return the target cloud (Q, 3) of row i."""
         return self.part("target_points", i)
 
-    @classmethod
-    def load(cls, path: str | Path, expected: Axes | Container | None = None) -> Self:
-        """Read the npz, which has to be of this version."""
-        version = int(load_arrays(path, {QUEUE_MARK: ()}, {QUEUE_MARK: WHOLE}, remedy=cls.remedy)[QUEUE_MARK])
-        if version != QUEUE_VERSION:
-            raise InputError(path, f"is a queue of version {version}, not {QUEUE_VERSION}", cls.remedy)
-        return super().load(path, expected)
-
     @property
     def marked(self) -> dict[str, np.ndarray]:
         """The arrays of a file, with the mark of a queue."""
-        return self.arrays | {QUEUE_MARK: np.array(QUEUE_VERSION)}
+        return self.arrays | {QUEUE_MARK: np.array(1)}
 
 
 def is_queue(path: str | Path) -> bool:

@@ -3,7 +3,7 @@
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cache
 from typing import Annotated
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from gpca.errors import InputError, require_known
 from gpca.seeds import generator, seed_of
-from gpca.settings import Bounds, Count
+from gpca.settings import Bounds, Count, require_arguments
 
 Transform = Callable[[np.ndarray], np.ndarray]
 
@@ -124,10 +124,7 @@ def make_reduction(name: str, settings: dict):
     """Return the reduction with its settings, None for ``none``; an unknown name or setting raises an InputError."""
     require_known("reduction", name, REDUCTIONS)
     reduction = REDUCTIONS[name]
-    names = [field.name for field in fields(reduction)] if reduction else []
-    if unknown := [key for key in settings if key not in names]:
-        remedy = f"its settings are {', '.join(names) or 'none'}"
-        raise InputError(f"reduction '{name}'", f"has no setting '{unknown[0]}'", remedy)
+    require_arguments(f"reduction '{name}'", reduction or (lambda: None), 0, settings)
     return reduction(**settings) if reduction else None
 
 

@@ -14,23 +14,8 @@ if TYPE_CHECKING:
 
 MODULES = {  # extra of pyproject.toml -> modules of its packages, which `gpca explain` does without
     "suite": (
-        "gpytorch",
-        "llvmlite",
-        "manifold3d",
-        "numba",
-        "open3d",
-        "pandas",
-        "PIL",
-        "pooch",
-        "requests",
-        "SALib",
-        "skactiveml",
-        "sklearn",
-        "shap",
-        "shapely",
-        "torch",
-        "trimesh",
-        "umap",
+        *("gpytorch", "llvmlite", "manifold3d", "numba", "open3d", "pandas", "PIL", "pooch", "requests", "SALib"),
+        *("skactiveml", "sklearn", "shap", "shapely", "torch", "trimesh", "umap"),
     ),
     "workflow": ("docutils", "jinja2", "markupsafe", "matplotlib", "snakemake"),
 }

@@ -39,13 +39,7 @@ def _cache_folder() -> Path:
                 return folder / state
         except OSError:  # not writable
             continue
-    folder = Path(tempfile.gettempdir(), f"gpca-numba-{os.getuid()}")  # for this user alone, as the code in it is run
-    try:
-        folder.mkdir(mode=0o700, exist_ok=True)
-        is_ours = not folder.is_symlink() and folder.stat().st_uid == os.getuid()
-    except OSError:
-        is_ours = False
-    return (folder if is_ours else Path(tempfile.mkdtemp(prefix="gpca-numba-"))) / state
+    return Path(tempfile.mkdtemp(prefix="gpca-numba-")) / state  # for this user alone, as the code in it is run
 
 
 class Compilations(Listener):

@@ -58,9 +58,8 @@ def entries_outside(variable: str, kind: str, of: type, taken: Iterable[str]) ->
             raise InputError(module_name, f"{variable} is not a mapping", f"give names, each with its {of.__name__}")
         for name, entry in entries.items():
             if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z0-9][\w.-]*", name, re.ASCII):
-                raise InputError(
-                    module_name, f"{variable} has the name {name!r}", "use letters, digits and underscores"
-                )
+                fault = f"{variable} has the name {name!r}"
+                raise InputError(module_name, fault, "use letters, digits and underscores")
             if not isinstance(entry, of):
                 raise InputError(module_name, f"{variable}['{name}'] is {_a(type(entry))}", f"make it {_a(of)}")
             title = name if isinstance(entry, str) else getattr(entry, "title", name)

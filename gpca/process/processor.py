@@ -9,27 +9,22 @@ have no effect on Open3D, small_gicp and other libraries compiled for one level,
 
 import os
 import platform
-from collections.abc import Mapping
 from pathlib import Path
-from types import MappingProxyType
 
 INSTRUCTIONS_VARIABLE = "GPCA_INSTRUCTIONS"  # "native" allows all instructions; results then differ between machines
 COMMON_LEVEL = "x86-64-v3"
 CPUINFO = Path("/proc/cpuinfo")
 THREAD_VARIABLES = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 _REQUIRED_FLAGS = {"avx2", "fma", "bmi1", "bmi2", "f16c", "movbe", "abm"}
-_PINS: Mapping[str, str] = MappingProxyType(
-    {
-        "OPENBLAS_CORETYPE": "Haswell",
-        # For AVX2, MKL takes another branch on AMD than on Intel.
-        "MKL_CBWR": "COMPATIBLE",
-        "NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL AVX512_SPR",
-        "ATEN_CPU_CAPABILITY": "avx2",
-        "ONEDNN_MAX_CPU_ISA": "AVX2",
-        "NUMBA_CPU_NAME": COMMON_LEVEL,
-        "NUMBA_CPU_FEATURES": "",  # unset, those of the machine would be added
-    }
-)
+_PINS = {
+    "OPENBLAS_CORETYPE": "Haswell",
+    "MKL_CBWR": "COMPATIBLE",  # for AVX2, MKL takes another branch on AMD than on Intel
+    "NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL AVX512_SPR",
+    "ATEN_CPU_CAPABILITY": "avx2",
+    "ONEDNN_MAX_CPU_ISA": "AVX2",
+    "NUMBA_CPU_NAME": COMMON_LEVEL,
+    "NUMBA_CPU_FEATURES": "",  # unset, those of the machine would be added
+}
 
 
 def prepare(threads: int = 1) -> None:

@@ -115,8 +115,8 @@ def test_numbers_that_are_constant_in_training_do_no_harm(name):
 
 FAULTS = [
     ("tsne", TRAIN, TEST, {}, "reduction 'tsne': unknown; choose one of none, pca, umap, autoencoder"),
-    ("pca", TRAIN, TEST, {"epochs": 3}, "reduction 'pca': has no setting 'epochs'; its settings are components"),
-    ("none", TRAIN, TEST, {"components": 3}, "reduction 'none': has no setting 'components'; its settings are none"),
+    ("pca", TRAIN, TEST, {"epochs": 3}, "reduction 'pca': setting epochs: unknown; choose one of components"),
+    ("none", TRAIN, TEST, {"components": 3}, "reduction 'none': setting components: unknown; leave it out"),
     ("pca", TRAIN, TEST, {"components": 25}, "25 components are too many for 45 training embeddings of 24 .* 24"),
     ("autoencoder", TRAIN[:9], TEST, {"components": 10}, "10 components are too many for 9 .*; .* at most 9"),
     ("umap", TRAIN[:12], TEST, {"components": 4}, "reduction 'umap': 15 neighbours are too many for 12 .*; lower n"),

@@ -36,7 +36,6 @@ def make_estimator(
     settings = dict(settings or {})
     require_estimator_settings(name, settings)
     entry = estimator_entry(name)
-    learning_failure = ""
     estimate = cast("Estimator", partial(entry.estimate, **settings) if entry.estimate else None)
     if entry.learn is not None:
         if not examples:
@@ -46,11 +45,10 @@ def make_estimator(
         try:
             estimate = entry.learn(examples, **settings)
         except FailedEstimate as failure:
-            learning_failure = str(failure)
+            failed = CovarianceEstimate(None, str(failure))
+            return lambda registered: failed
 
     def estimate_or_failure(registered: RegisteredPair) -> CovarianceEstimate:
-        if learning_failure:
-            return CovarianceEstimate(None, learning_failure)
         if registered.outcome.fitness == 0:
             return CovarianceEstimate(None, registered.outcome.failure or "no source point is near the target")
         try:
