@@ -46,10 +46,7 @@ def draw_causes_example(
     dataset: str = "",
 ) -> Figure:
     """Draw the registration with all causes, without the one that does most and without any; below these, what each
-    cause adds to the error v, and the scores of the explainers.
-
-    The sample is a usual case with a clear cause, whoever is right about it: a failure of several causes whose largest
-    φ is at least 0.6 of the sum of all. The paths name the shown source and seed.
+    cause adds to the error v, and the scores of the explainers. The paths name the shown source and seed.
     """
     causes = Causes.load(causes_npz)
     row = usual_failure(causes, causes_npz, is_clear(causes))
@@ -86,8 +83,7 @@ def draw_failures(
 ) -> Figure:
     """Draw a failed test registration of each source (rows) and dominant cause (columns), with what explainers name.
 
-    Shown is the failure whose error is the median of its kind. Files are given by title of their source, explainers by
-    their titles.
+    Shown is the failure whose error is the median of its kind. Files are given by title of their source.
     """
     size = (TEXT_WIDTH_IN, HEAD_IN + GALLERY_IN * len(causes_npz))
     figure = use_style().figure(figsize=size, layout="constrained")
@@ -133,8 +129,6 @@ def _draw_over_solid(
     for panel, (name, cloud) in zip(panels.flat, clouds.items(), strict=False):
         solid.draw(panel, cloud, size, corners_2_2)
         write_below(panel, name, fontsize=SMALL_PT)
-    for spare in panels.flat[len(clouds) :]:
-        spare.set_axis_off()
 
 
 def _draw_waterfall(panel, error: float, phi_3: np.ndarray) -> None:

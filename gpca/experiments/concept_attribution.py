@@ -14,7 +14,7 @@ from gpca.evaluation.intervals import Clustered
 from gpca.evaluation.measures import ALL, Measure, by_value, over_seeds, read_all_metrics, read_samples
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.registry import explainer_entry
-from gpca.reporting.sheet import Cell, Column, Row, Sheet, Show, crossed, over_clusters, show, where, with_label
+from gpca.reporting.sheet import Cell, Column, Row, Sheet, crossed, over_clusters, show, where, with_label
 from gpca.reporting.tables.cells import cell_of_repeats
 from gpca.reporting.words import span
 
@@ -65,13 +65,6 @@ EXTENDED = {
     "icp_calls": Column("ICP calls", decimals=0, interval=False, limits=(0, inf)),
     "seconds_per_sample": Column("Seconds", decimals=3, interval=False, limits=(0, inf)),
     "test_samples": Column("n", decimals=0, interval=False, limits=(0, inf)),
-}
-NOTES = {
-    "icp_calls": "ICP calls: ICP runs per sample beyond the observed registration.",
-    "seconds_per_sample": "Seconds: all that one sample takes, the observed registration included; "
-    "the one column that differs from run to run.",
-    "test_samples": "n: test samples of a seed; fewer where each takes hundreds of ICP calls "
-    "(uncertainty.*.samples, config).",
 }
 
 
@@ -134,26 +127,24 @@ def table1_extended(run: Run, intervals, metrics):
     entries = {name: explainer_entry(name) for name in run.section("explainers")}
 
     def more(row: Row, _subset: Frame) -> dict[str, Cell | None]:
-        measured = where(metrics, {**row.where, "concept": ALL})
-        cells = {}
-        samples = int(where(measured, {"metric": "test_samples"})["value"].sum())
-        for metric in [metric for metric, column in EXTENDED.items() if not isinstance(column, Show)]:
-            values_R = where(measured, {"metric": metric})["value"].to_numpy()
-            cells[metric] = cell_of_repeats(values_R * (100 if metric == "abstention_rate" else 1), samples)
-        return cells
+        of_metric = where(metrics, {**row.where, "concept": ALL}).groupby("metric")["value"]
+        values = {metric: value_R.to_numpy() for metric, value_R in of_metric}
+        samples, factor = int(values["test_samples"].sum()), {"abstention_rate": 100}
+        shown = [metric for metric in EXTENDED if metric in values and metric != "accuracy"]
+        return {metric: cell_of_repeats(values[metric] * factor.get(metric, 1), samples) for metric in shown}
 
     rows = crossed(("source", run.source_titles), ("method", titles(run)))
     rows = with_label(rows, lambda row: entries[row.where["method"]].sight)
     rows = [replace(row, rival=not entries[row.where["method"]].oracle) for row in rows]
     heads = {"source": "Dataset", "explainer": "Explainer", "reads": "Reads"}
     sheet = Sheet("table1_extended", heads, rows, EXTENDED, intervals, more=more)
-    filled = {metric for _, metric in sheet.cells}
-    apart = ", oracles apart" if any(entry.oracle for entry in entries.values()) else ""
-    notes = {"accuracy": f"Bold: best accuracy on the dataset{apart}. Abstained samples are wrong.", **NOTES}
     footnotes = (
         repeats(cell for (_, key), cell in sheet.cells.items() if key == "accuracy"),
-        "Reads: what an explainer sees of a registration; chance and the most frequent label see nothing.",
-        *(note for metric, note in notes.items() if metric in filled),
+        "Bold: best accuracy on the dataset, oracles apart. Abstained samples are wrong. Reads: what an explainer sees "
+        "of a registration.",
+        "ICP calls: ICP runs per sample beyond the observed registration. Seconds: all that one sample takes, that "
+        "registration included; the one column that differs from run to run. n: test samples of a seed; fewer where "
+        "each takes hundreds of ICP calls (uncertainty.*.samples, config).",
     )
     caption = "Single-concept attribution by every explainer" + run.stand_ins()
     return sheet.table(caption, "metric", footnotes, bold=["accuracy"], same=1)

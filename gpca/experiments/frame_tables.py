@@ -13,7 +13,7 @@ from gpca.experiments.frames import CLASSIC, REDUCTIONS, TOGETHER, title_of_fram
 from gpca.explainers.registry import explainer_entry
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD, conditions_of
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.sheet import Column, Row, Sheet, cell_of_repeats, crossed, plain_cell, show, where
+from gpca.reporting.sheet import Column, Row, Sheet, cell_of_repeats, crossed, plain_cell, show, where, with_label
 from gpca.reporting.words import dataset_in_words, plural
 
 PUBLISHED_NOTE = "readings of which architecture the paper used; they are not compared with what it prints."
@@ -95,13 +95,7 @@ def table6_backbones(run: Run, intervals, metrics):
     shown = sheet.cells[0, "accuracy"]
     few = max((cell.seeds for (row, _), cell in sheet.cells.items() if not sheet.rows[row].rival), default=shown.seeds)
     fewer = f", over the first {plural(few, 'seed')}" if few < shown.seeds else ""
-    encoder, reduction = "encoder", section["reductions"][0]
-    if section["pretraining"]:
-        encoder += " that goes on from one pretrained on whole objects"
-    if section["pretraining"] and section["virtual"]:
-        tested = section["virtual"]["objects"] == "all"
-        of = "the models of all objects" if tested else "models of objects that no tested frame shows"
-        encoder += f" and on frames rendered of {of}"
+    reduction, encoder = section["reductions"][0], "pretrained encoder" if section["pretraining"] else "encoder"
     other = " without reduction" if reduction == "none" else f" with {REDUCTIONS[reduction]}"
     notes = (
         f"{sheet.over(shown.test_samples // shown.seeds, SCENES)}. Training sees none of these scenes. Each seed has "
@@ -131,11 +125,8 @@ def table6_seen_unseen(run: Run, intervals, metrics):
     embedded = (*frames.reduced_backbones(section), *frames.published_backbones(section))
     methods = {name: frames.encoder_title(*name.split("-")) for name in embedded} | CLASSIC
     methods |= run.titles(explainer_entry, section["explainers"])
-    rows = []
-    for row in crossed(("source", conditions), ("method", methods)):
-        method = row.where["method"]
-        sees = explainer_entry("gpca" if method in embedded else method).sight
-        rows.append(Row([*row.labels, (sees, sees)], row.where))
+    reads = {name: explainer_entry("gpca" if name in embedded else name).sight for name in methods}
+    rows = with_label(crossed(("source", conditions), ("method", methods)), lambda row: reads[row.where["method"]])
     datasets = sorted({name for name in intervals["table"] if name.startswith(DATASET)})
     columns = {name: show("accuracy", title, where={"table": name}) for name, title in EVERYTHING_SEEN.items()}
     for name in datasets:
@@ -150,30 +141,18 @@ def table6_seen_unseen(run: Run, intervals, metrics):
 
     heads = {"condition": "Initial poses", "method": "Method", "reads": "Reads"}
     sheet = Sheet("table6_seen_unseen", heads, rows, columns | NOT_SHARES, intervals, more=more)
-    counts: dict[str, list[str]] = {}  # numbers of samples and seeds, by initial poses where these differ
-    for source, words in conditions.items():
-        cells = {key: cell for (row, key), cell in sheet.cells.items() if sheet.rows[row].where["source"] == source}
-        of_columns = [
-            f"{column.title.removesuffix(' (%)')} {cells[key].test_samples} ({plural(cells[key].seeds, 'seed')})"
-            for key, column in columns.items()
-            if key in cells
-        ]
-        if of_columns:
-            counts.setdefault(", ".join(of_columns), []).append(words)
     first = where(intervals, {"source": REAL_WORLD, "metric": "accuracy", "concept": ALL})
     samples = first.groupby("table")["samples"].sum()
     seen, unseen = (f"{100 * samples.get(name, 0) / samples.get(TOGETHER, inf):.0f} %" for name in (SEEN, UNSEEN))
-    rendered = (section["virtual"] or {}).get("objects") == "all"
+    renders_all = (section["virtual"] or {}).get("objects") == "all"
+    rendered = " The pretraining renders the models of both." if renders_all else ""
     notes = (
         f"{sheet.over(clusters=SCENES)}. Shares of the test samples of all seeds together, as some seeds "
         "have more of a column than others. Bold: best for one kind of initial poses.",
-        *(f"Test samples{', ' + ' and '.join(of) if len(counts) > 1 else ''}: {each}." for each, of in counts.items()),
         f"No scene is in both training and test. Seen objects ({seen} of the test samples) are shown in a scene of the "
-        f"training too, unseen ones ({unseen}) are not. "
-        f"{'The pretraining renders the models of both. ' if rendered else ''}Instances take turns, so that objects "
-        "and datasets are as unequally frequent as in the frames.",
-        "ECE: expected calibration error, NLL: mean negative log likelihood, both of all; means over the seeds. "
-        "Reads: what a method sees of a registration. ICP calls: runs beyond the one that it explains.",
+        f"training too, unseen ones ({unseen}) are not.{rendered}",
+        "ECE: expected calibration error, NLL: mean negative log likelihood; means over the seeds. Reads: what a "
+        "method sees of a registration. ICP calls: runs beyond the one that it explains.",
     )
     caption = f"Accuracy (%) on {title_of_frames(run.config)}: objects that training saw and did not see"
     return sheet.table(caption, "samples", notes, bold=EVERYTHING_SEEN, same=1, keep_empty=True)

@@ -91,16 +91,6 @@ def test_accuracies_and_differences_have_their_interval_over_scenes_and_the_devi
     )
 
 
-def test_the_note_says_what_encoders_were_pretrained_on():
-    pretraining = {"pretraining": {"epochs": 1}}
-    assert "perturbations, encoder, and GPC" in make().footnotes[0]
-    assert "pretrained on whole objects, and GPC" in make(**pretraining).footnotes[0]
-    rendered = make(**pretraining, virtual={"objects": "all"})
-    assert "on whole objects and on frames rendered of the models of all objects, and GPC" in rendered.footnotes[0]
-    unseen = make(**pretraining, virtual={"objects": "training"})
-    assert "rendered of models of objects that no tested frame shows, and GPC" in unseen.footnotes[0]
-
-
 def test_untrained_explainers_stand_below_and_a_backbone_without_a_title_has_its_name():
     values = VALUES | {"chance": (0.3, 0.3, 0.4), "gpca_pair": (0.9, 0.9, 0.9)}
     table = make(values, explainers={"chance": {}, "gpca_pair": {}})
@@ -165,9 +155,6 @@ def test_rows_are_conditions_by_methods_and_columns_what_was_seen():
     text = table.markdown()
     assert "40 % of the test samples" in text
     assert "| LINEMOD-Occlusion (%) |" in text
-    counts = "Test samples, True pose, small error: All 200 (2 seeds), Seen objects 80 (2 seeds), Unseen objects 120"
-    assert f"{counts} (2 seeds), LINEMOD-Occlusion 30 (1 seed)." in text
-    assert "Test samples, Global registration: All 200 (2 seeds)." in text
 
 
 def test_the_note_says_that_the_pretraining_knows_the_models():
