@@ -68,7 +68,7 @@ def fig2_overview(run: Run, registrations: Path, embeddings: Path, predictions: 
     canvas.arrow((3.23, 1.56), (3.23, 1.39))
     canvas.arrow((2.79, 1.14), (2.79, 0.97))
     scores = canvas.panel(2.58, 0.36, 0.42, 0.56)
-    stages_of.draw_scores_with_numbers(scores, sample)
+    stages_of.draw_scores(scores, sample, numbered=True)
     canvas.text(2.79, 0.02, r"scores $\hat{s}_c \pm \sqrt{v_c}$", va="bottom")
 
     bald_N = stages.predictions.loc[stages.predictions["split"] == "test", "bald"].to_numpy()

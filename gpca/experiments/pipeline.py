@@ -143,7 +143,7 @@ def _draw_inference(canvas: Canvas, stages: drawing.Staged, row: int, encoder: s
     panel.set_axis_off()
     canvas.text(4.62, 2.03, "★ this sample", va="bottom")
     canvas.arrow((5.22, middle_in), (5.58, middle_in))
-    drawing.draw_scores_with_numbers(canvas.panel(5.96, 2.42, 0.62, 0.62), sample)
+    drawing.draw_scores(canvas.panel(5.96, 2.42, 0.62, 0.62), sample, numbered=True)
     words = rf"$\hat{{s}}_c \pm \sqrt{{v_c}}$;  $\hat{{c}}$ = {sample['concept_predicted']}"
     canvas.text(6.36, captions_in, words, va="top")
 

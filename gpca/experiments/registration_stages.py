@@ -10,7 +10,7 @@ import numpy as np
 
 from gpca.alignment.pose_error import adds_error
 from gpca.attribution.metrics import read_uncertainties
-from gpca.attribution.predictions import concepts_of, read_predictions
+from gpca.attribution.predictions import read_predictions
 from gpca.causes.settings import Limits
 from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL
 from gpca.declarations import Frame, Run, Series
@@ -50,11 +50,7 @@ class Staged:
         h_S_d = read_embedding(embeddings_npz, registrations)["embedding"]
         predictions = read_predictions(predictions_csv)
         require_same_samples(predictions_csv, predictions, registrations.arrays)
-        if set(concepts_of(predictions)) != set(CONCEPTS):
-            raise InputError(predictions_csv, f"does not score the concepts {', '.join(CONCEPTS)}", "regenerate it")
         for column in ("bald", *(f"variance_{concept}" for concept in CONCEPTS)):
-            if column not in predictions:
-                raise InputError(predictions_csv, f"column '{column}' is missing", "give predictions of GP-CA")
             predictions[column] = numbers(predictions_csv, predictions, column)
         observed, u_clean = read_uncertainties(uncertainty_csv)
         samples = list(zip(registrations.split.tolist(), registrations.sample.astype(str).tolist(), strict=True))
@@ -160,31 +156,24 @@ def draw_embedding(axes, h_d: np.ndarray) -> None:
     axes.spines[:].set(visible=True, linewidth=0.6, color=GRAY)
 
 
-def draw_scores_with_numbers(axes, sample: Series) -> None:
-    """Draw a sample's concept scores as bars ± one standard deviation, and write score ± deviation beside them."""
-    draw_scores(axes, sample)
-    for place, concept in enumerate(CONCEPTS):
-        deviation = np.sqrt(sample[f"variance_{concept}"])
-        words = f"{sample[f'score_{concept}']:.2f}±{deviation:.2f}"
-        axes.text(1.06, place, words, ha="left", va="center", fontsize=SMALL_PT)
-
-
-def draw_scores(axes, row: Series) -> None:
-    """Draw a sample's concept scores as bars with ± one standard deviation, the true concept's name in bold."""
+def draw_scores(axes, row: Series, numbered: bool = False) -> None:
+    """Draw a sample's concept scores as bars ± one standard deviation, the numbers beside them if asked for."""
+    scores = [row[f"score_{concept}"] for concept in CONCEPTS]
     deviations = [np.sqrt(row[f"variance_{concept}"]) for concept in CONCEPTS]
-    draw_score_bars(axes, [row[f"score_{concept}"] for concept in CONCEPTS], row["concept_true"], deviations)
+    draw_score_bars(axes, scores, row["concept_true"], deviations)
     axes.set(xlim=(0, 1))
     axes.set_xticks([0, 0.5, 1], ["0", "0.5", "1"])
+    for place, pair in enumerate(zip(scores, deviations, strict=True)) if numbered else ():
+        axes.text(1.06, place, "{:.2f}±{:.2f}".format(*pair), ha="left", va="center", fontsize=SMALL_PT)
 
 
 def draw_score_bars(
     axes, scores_C: Sequence[float], true_concept: str, deviations_C: Sequence[float] | None = None
 ) -> None:
     """Draw a bar for each concept from top to bottom, without axis at the left, the true concept's name in bold."""
+    colors = [CONCEPT_COLORS[concept] for concept in CONCEPTS]
+    axes.barh(range(len(CONCEPTS)), scores_C, 0.7, xerr=deviations_C, color=colors, error_kw={"lw": 0.8})
     for place, concept in enumerate(CONCEPTS):
-        deviation = None if deviations_C is None else deviations_C[place]
-        look = {"color": CONCEPT_COLORS[concept], "height": 0.7, "error_kw": {"lw": 0.8}}
-        axes.barh(place, scores_C[place], xerr=deviation, **look)
         weight = "bold" if concept == true_concept else "normal"
         axes.text(-0.03, place, concept, ha="right", va="center", fontsize=SMALL_PT, fontweight=weight)
     axes.set(ylim=(len(CONCEPTS) - 0.4, -0.6), yticks=[])

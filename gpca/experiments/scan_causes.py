@@ -22,7 +22,7 @@ from gpca.causes.truth import BORDERLINE, GEOMETRY
 from gpca.declarations import Experiment, Frame, LeftOut, Names, Paths, Run, Step, numbers
 from gpca.encoders.registry import encoder_module
 from gpca.errors import InputError, with_key
-from gpca.evaluation.intervals import TRIVIAL, best_of, corrected, interval, pigeonhole_weights, weighted_mean
+from gpca.evaluation.intervals import TRIVIAL, Clustered, best_of, corrected, interval, weighted_mean
 from gpca.evaluation.measures import ALL, POOLED
 from gpca.experiments.frame_causes import count_ends, ends_of
 from gpca.experiments.scans import EACH_SET, ChoiceSettings, files_of_set, place_of_set
@@ -34,7 +34,7 @@ from gpca.io.csv_file import numbers as number_column
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.scans.scene import stratum_of
-from gpca.seeds import generator, seed_of_file
+from gpca.seeds import seed_of_file
 from gpca.settings import Distinct, changes_of, fields_of
 from gpca.steps.scans import TrialSettings
 
@@ -232,13 +232,11 @@ def collect(run: Run, causes_files: Paths, sample_files: Paths, prediction_files
 
 def _shares(place: tuple, failed: Frame) -> Iterator[tuple]:
     """Shares of the failed by each cause: as drawn, and as the overlaps of the data set are."""
-    drawn_B_N = pigeonhole_weights(generator("scan shares", *place), failed["seed"].to_numpy(), failed["cluster"])
-    weights_B_N = np.vstack([np.ones(len(failed)), drawn_B_N])
-    sizes = len(failed), failed["cluster"].nunique(), failed["seed"].nunique()
+    draws = Clustered.drawn(failed["seed"], failed["cluster"], "scan shares", *place)
     for (name, (column, weighted)), concept in product(SHARES.items(), CONCEPTS):
         weight_N = failed["stands_for"].to_numpy() if weighted else 1.0
-        share_B = weighted_mean(failed[column] == concept, weights_B_N * weight_N)
-        yield (*place, f"{name}_{concept}", *sizes, *interval(share_B, drawn_B_N), *NO_LEAD)
+        share_B = weighted_mean(failed[column] == concept, draws.weights * weight_N)
+        yield (*place, f"{name}_{concept}", *draws.counts[::-1], *interval(share_B, draws.weights[1:]), *NO_LEAD)
 
 
 def read_scan_causes(path: str | Path) -> Frame:
@@ -282,24 +280,21 @@ def _measures(
     place: tuple[str, str, str], judged: dict[tuple[str, str], answers.Judged], cluster_N: np.ndarray
 ) -> Iterator[tuple]:
     any_samples = next(iter(judged.values()))
-    drawn_B_N = pigeonhole_weights(generator("scan cause intervals", *place), any_samples.seed, cluster_N)
-    weights_B_N = np.vstack([np.ones(len(any_samples)), drawn_B_N])
-    values = {key: scan_measures(samples, weights_B_N) for key, samples in judged.items()}
+    draws = Clustered.drawn(any_samples.seed, cluster_N, "scan cause intervals", *place)
+    values = {key: scan_measures(samples, draws.weights) for key, samples in judged.items()}
     names = {key: "/".join(key).strip("/") for key in judged}
     for metric, key in product(MEASURED, judged):
         drawn = {names[other]: each[metric] for other, each in values.items() if metric in each}
         value_B = drawn.get(names[key], np.array([np.nan]))
         if not np.isfinite(value_B[0]):
             continue
-        counted_N = counted_of_scans(any_samples, metric)
-        drawn_B_n = drawn_B_N[:, counted_N] if metric in (*answers.SHARES, CAUSES) else None
-        gates = [names[other] for other in judged if other != key and is_trivial(other[1])]
-        lead = NO_LEAD
+        counted = draws.subset(counted_of_scans(any_samples, metric))
+        drawn_B_n = counted.weights[1:] if metric in (*answers.SHARES, CAUSES) else None
+        gates, lead = [names[other] for other in judged if other != key and is_trivial(other[1])], NO_LEAD
         gate = best_of(drawn, gates, metric in answers.SMALLER_IS_BETTER)
         if gate and key[1] != answers.CEILING and metric != SAMPLES:
             lead = (gate, *interval(value_B - drawn[gate], drawn_B_n, difference=True))
-        counts = int(counted_N.sum()), len(set(cluster_N[counted_N])), len(set(any_samples.seed[counted_N].tolist()))
-        yield (*place, *key, metric, *counts, *interval(value_B, drawn_B_n), *lead)
+        yield (*place, *key, metric, *counted.counts[::-1], *interval(value_B, drawn_B_n), *lead)
 
 
 def is_trivial(explainer: str) -> bool:
@@ -312,12 +307,9 @@ def scan_measures(samples: answers.Judged, weights_B_N: np.ndarray) -> dict[str,
     measures = answers.measure(samples, weights_B_N)
     measures[SAMPLES] = np.full(len(weights_B_N), float((samples.label != BORDERLINE).sum()))
     if samples.names_causes:  # mean over the causes with enough failures of the share whose cause has the largest score
-        named_N, recalls = np.array(CONCEPTS)[samples.scores.argmax(axis=1)], []
-        for concept in _frequent(samples):
-            is_cause_N = samples.label == concept
-            with np.errstate(divide="ignore", invalid="ignore"):
-                right_B = (weights_B_N[:, is_cause_N] * (named_N[is_cause_N] == concept)).sum(axis=1)
-                recalls.append(right_B / weights_B_N[:, is_cause_N].sum(axis=1))
+        named_N = np.array(CONCEPTS)[samples.scores.argmax(axis=1)]
+        parts = {concept: samples.label == concept for concept in _frequent(samples)}
+        recalls = [weighted_mean(named_N[of] == concept, weights_B_N[:, of]) for concept, of in parts.items()]
         measures[CAUSES] = np.mean(recalls, axis=0) if recalls else np.full(len(weights_B_N), np.nan)
     return measures
 

@@ -2,39 +2,22 @@
 
 import math
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from gpca.comparison import verdicts as judged
 from gpca.comparison.published import TEXT, TITLES
-from gpca.comparison.verdicts import (
-    CLOSE,
-    COMPARISON_COLUMNS,
-    DECIDED,
-    INCONCLUSIVE,
-    NOT_REPRODUCED,
-    PAPER_TOO_WIDE,
-    REPRODUCED,
-    judged_once,
-)
 from gpca.declarations import Figure, Frame, Run, figure
 from gpca.io.csv_file import read_numbers
-from gpca.reporting.figures.style import (
-    GRAY,
-    GREEN,
-    LIGHT_GRAY,
-    SMALL_PT,
-    TEXT_WIDTH_IN,
-    VERMILION,
-    use_style,
-    write_title,
-)
+from gpca.reporting.figures import style
+from gpca.reporting.figures.style import GRAY, LIGHT_GRAY, SMALL_PT, TEXT_WIDTH_IN
 
 NUMBERS = ("difference", "factor")
 BY_PAPER = "inconclusive by the paper's own interval"
 LOOKS = {  # verdict -> color of a cell, and of the number in it
-    REPRODUCED: (GREEN, "white"),
-    CLOSE: ("#9AD3BF", "black"),
-    NOT_REPRODUCED: (VERMILION, "white"),
-    INCONCLUSIVE: ("white", "black"),
+    judged.REPRODUCED: (style.GREEN, "white"),
+    judged.CLOSE: ("#9AD3BF", "black"),
+    judged.NOT_REPRODUCED: (style.VERMILION, "white"),
+    judged.INCONCLUSIVE: ("white", "black"),
     BY_PAPER: ("#E8E8E8", "black"),
 }
 OTHER_LOOK = (LIGHT_GRAY, GRAY)
@@ -55,19 +38,14 @@ class Block(NamedTuple):
     cells: dict[tuple[str, str], dict]
 
     @property
-    def width_in(self) -> float:
-        """Width with the labels of its rows."""
-        return self.labels_in + CELL_IN * len(self.columns)
-
-    @property
-    def labels_in(self) -> float:
-        """Width of the labels of its rows."""
-        return 0.08 + LETTER_IN * max(len(SHORT.get(name, name)) for name in self.rows)
+    def widths_in(self) -> tuple[float, float]:
+        """Width of the labels of its rows, and with its cells."""
+        labels_in = 0.08 + LETTER_IN * max(len(SHORT.get(name, name)) for name in self.rows)
+        return labels_in, labels_in + CELL_IN * len(self.columns)
 
 
 def read_comparison(path: str | Path) -> Frame:
-    """Read the rows of ``comparison.csv``."""
-    return read_numbers(path, COMPARISON_COLUMNS, NUMBERS, optional=NUMBERS)
+    return read_numbers(path, judged.COMPARISON_COLUMNS, NUMBERS, optional=NUMBERS)
 
 
 @figure(
@@ -79,31 +57,31 @@ def read_comparison(path: str | Path) -> Frame:
     comparison=(read_comparison, "comparison.csv"),
 )
 def verdicts(run: Run, comparison) -> Figure:
-    by_paper = comparison["reason"] == PAPER_TOO_WIDE
-    once = judged_once(comparison.assign(verdict=comparison["verdict"].mask(by_paper, BY_PAPER)))
+    by_paper = comparison["reason"] == judged.PAPER_TOO_WIDE
+    once = judged.judged_once(comparison.assign(verdict=comparison["verdict"].mask(by_paper, BY_PAPER)))
     lines = [[block for table in tables for block in _blocks(table, once)] for tables in LINES]
     heights_in = [HEAD_IN + ROW_IN * max(len(block.rows) for block in line) + GAP_IN for line in lines if line]
     size = (TEXT_WIDTH_IN, TOP_IN + sum(heights_in))
-    drawing = use_style().figure(figsize=size)
+    drawing = style.use_style().figure(figsize=size)
     panel = drawing.add_axes((0, 0, 1, 1), xlim=(0, size[0]), ylim=(size[1], 0))
     panel.axis("off")
     top_in = TOP_IN
     for line, height_in in zip(filter(None, lines), heights_in, strict=True):
-        gap_in = (size[0] - sum(block.width_in for block in line)) / len(line)
+        gap_in = (size[0] - sum(block.widths_in[1] for block in line)) / len(line)
         left_in = 0.0
         for block in line:
             _draw(panel, block, left_in, top_in)
-            left_in += block.width_in + gap_in
+            left_in += block.widths_in[1] + gap_in
         top_in += height_in
     counted = once["verdict"].value_counts()
     left_in = 0.05
     for verdict in dict.fromkeys([*LOOKS, *counted.index]):
         words = f"{counted.get(verdict, 0)} {verdict}"
-        _cell(panel, left_in, 0.26, *LOOKS.get(verdict, OTHER_LOOK), width_in=0.14)
+        _cell(panel, left_in, 0.26, LOOKS.get(verdict, OTHER_LOOK)[0], width_in=0.14)
         panel.text(left_in + 0.18, 0.26 + ROW_IN / 2, words, fontsize=SMALL_PT, va="center")
         left_in += 0.36 + LETTER_IN * len(words)
-    decided = once["verdict"].isin(DECIDED).sum()
-    write_title(drawing, f"{decided} of {len(once)} printed means are decided{run.stand_ins()}")
+    decided = once["verdict"].isin(judged.DECIDED).sum()
+    style.write_title(drawing, f"{decided} of {len(once)} printed means are decided{run.stand_ins()}")
     return drawing
 
 
@@ -126,7 +104,7 @@ def _blocks(table: str, once: Frame) -> list[Block]:
 
 
 def _draw(panel, block: Block, left_in: float, top_in: float) -> None:
-    first_in, below_in = left_in + block.labels_in, top_in + HEAD_IN
+    first_in, below_in = left_in + block.widths_in[0], top_in + HEAD_IN
     title_in = (first_in, top_in + 0.08) if block.columns != [""] else (left_in + 0.05, top_in + 0.22)
     panel.text(*title_in, block.title, weight="bold", va="center")
     for j, name in enumerate(block.columns):
@@ -141,19 +119,16 @@ def _draw(panel, block: Block, left_in: float, top_in: float) -> None:
                 continue
             color, ink = LOOKS.get(row["verdict"], OTHER_LOOK)
             x_in = first_in + CELL_IN * j
-            _cell(panel, x_in, below_in + ROW_IN * i, color, ink)
-            panel.text(
-                x_in + CELL_IN / 2, middle_in, _words(row), color=ink, fontsize=SMALL_PT, ha="center", va="center"
-            )
+            _cell(panel, x_in, below_in + ROW_IN * i, color)
+            look = {"color": ink, "fontsize": SMALL_PT, "ha": "center", "va": "center"}
+            panel.text(x_in + CELL_IN / 2, middle_in, _words(row), **look)
 
 
-def _cell(panel, x_in: float, y_in: float, color: str, ink: str, width_in: float = CELL_IN) -> None:
+def _cell(panel, x_in: float, y_in: float, color: str, width_in: float = CELL_IN) -> None:
     from matplotlib.patches import Rectangle
 
-    edge = GRAY if color == "white" else "white"
-    panel.add_patch(
-        Rectangle((x_in + 0.01, y_in + 0.01), width_in - 0.02, ROW_IN - 0.02, facecolor=color, edgecolor=edge)
-    )
+    look: dict[str, Any] = {"facecolor": color, "edgecolor": GRAY if color == "white" else "white"}
+    panel.add_patch(Rectangle((x_in + 0.01, y_in + 0.01), width_in - 0.02, ROW_IN - 0.02, **look))
 
 
 def _words(row: dict) -> str:
