@@ -14,10 +14,9 @@ from gpca.settings import Positive
 class ConceptVectors(ScoringExplainer):
     """Concept activation vectors (CAV; Kim et al. 2018, TCAV), read per sample.
 
-    TCAV's score describes a dataset; its basis can score a sample. A CAV is the normal of a linear probe between one
-    concept and the others (TCAV's relative CAV) in the standardized embedding. The scores are the softmax over concepts
-    of the projections on the CAVs, standardized on the training rows; a concept without training rows has score 0.
-    `inverse_regularisation` is scikit-learn's C of the probes, a convex problem without random numbers.
+    A CAV is the normal of a linear probe between one concept and the others in the standardized embedding. The scores
+    are the softmax over concepts of the projections on the CAVs, standardized on the training rows; a concept without
+    training rows has score 0.
     """
 
     def __init__(self, source: str, seed: int, inverse_regularisation: Positive = 1.0) -> None:

@@ -1,8 +1,7 @@
 """Heads of a neural network on the embeddings, with deep learning's measures of uncertainty (paper, Table V).
 
-The encoder is fixed; a head with one hidden layer is trained on the labeled embeddings. Draws of the logits give
-scores, variances and BALD like GP-CA's: members of a deep ensemble (Lakshminarayanan et al. 2017), or passes of
-Monte-Carlo dropout (Gal & Ghahramani 2016).
+Draws of the logits give scores, variances and BALD like GP-CA's: members of a deep ensemble (Lakshminarayanan et al.
+2017), or passes of Monte-Carlo dropout (Gal & Ghahramani 2016).
 """
 
 import math
@@ -107,13 +106,10 @@ class HeadLearner(ScoringExplainer):
     def fit(self, registrations: Registrations) -> None:
         known_concepts(registrations.concept)
         target_N = np.array([CONCEPTS.index(concept) for concept in registrations.concept])
-        self._train(attached(registrations, "embedding"), target_N)
+        self._heads.fit(attached(registrations, "embedding"), target_N)
 
     def summary(self, registrations: Registrations) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return summarize_draws(self._draw_logits(attached(registrations, "embedding")))
-
-    def _train(self, h_N_d: np.ndarray, target_N: np.ndarray) -> None:
-        self._heads.fit(h_N_d, target_N)
 
     def _draw_logits(self, h_N_d: np.ndarray) -> np.ndarray:
         raise NotImplementedError

@@ -1,8 +1,7 @@
 """Explainers that see the pair, both clouds and perhaps the motion of ICP, instead of the aligned source alone.
 
-`gpca_pair` is the paper's classifier on relations that do not depend on the object
-(:func:`gpca.pairs.distances.relations`). `gpca_pair_clouds` does not read how far ICP moved the cloud, which gives
-pose errors away in the paper's protocol. `pair_forest` is the plainest form of the same idea; `density` is a control.
+`gpca_pair` is the paper's classifier on :func:`gpca.pairs.distances.relations`, which do not depend on the object.
+`gpca_pair_clouds` does not read how far ICP moved the cloud, which gives pose errors away in the paper's protocol.
 """
 
 from functools import partial
@@ -66,9 +65,8 @@ def pair_forest(source: str, seed: int, trees: Count = 200, points: DescribedPoi
     from sklearn.ensemble import RandomForestClassifier
 
     random_state = seed_of(source, seed, "pair_forest") % 2**32
-    return PairLearner(
-        RandomForestClassifier(n_estimators=trees, random_state=random_state), source, seed, "distances", points
-    )
+    classifier = RandomForestClassifier(n_estimators=trees, random_state=random_state)
+    return PairLearner(classifier, source, seed, "distances", points)
 
 
 def density(

@@ -1,8 +1,7 @@
 """Sensitivity analysis of the registration's uncertainty: local derivatives, PRCC and Sobol indices.
 
-Local: one knob at a time, as in the paper. Global: partial rank correlation over a Latin hypercube (Marino et al. 2008,
-cited by the paper) and total indices by Saltelli's scheme (Saltelli et al. 2010, through SALib). Remedies are switched
-on one at a time (docs/baselines.md).
+Local: one knob at a time, as in the paper. Global: partial rank correlation over a Latin hypercube (Marino et al. 2008)
+and total indices by Saltelli's scheme (Saltelli et al. 2010). Remedies are switched on one at a time.
 """
 
 from collections.abc import Callable
@@ -68,10 +67,6 @@ def single_drops(worth_N_8: np.ndarray) -> np.ndarray:
     return worth_N_8[:, ONE_AT_A_TIME[1:]] - worth_N_8[:, :1]
 
 
-def _single_remedies(errors_N_8: np.ndarray) -> np.ndarray:
-    return single_drops(-errors_N_8[:, ::-1])
-
-
 # The paper uses local derivatives at the observed pair.
 sa_local_additive = partial(KnobValues, local_derivatives, STEPS)
 _prcc = partial(KnobValues, partial(_over_settings, partial_rank_correlations, "latin"), None)
@@ -86,5 +81,5 @@ EXPLAINERS = {
     "sa_local_removal_residual": _removal("SA, remedies, residual", _drops),
     "sa_supervised": _removal("SA, remedies, learned", partial(LearnedValues, single_drops, ONE_AT_A_TIME)),
 }
-_causes = partial(RemovalValues, _single_remedies)
+_causes = partial(RemovalValues, lambda errors_N_8: single_drops(-errors_N_8[:, ::-1]))
 CAUSE_EXPLAINERS = {"sa_removal": ExplainerEntry("SA, remedies", _causes, ("remedies",), reads="descriptors")}

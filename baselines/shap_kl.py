@@ -1,9 +1,8 @@
 """SHAP over the registration's uncertainty (Lundberg & Lee 2017; Qin et al. 2024), under four protocols.
 
-The three features are the concepts: noise, pose, overlap. The worth of a coalition is the uncertainty with those
-features present; the concept with the largest Shapley value is named. The protocols differ in what a feature is
-(docs/baselines.md): a knob turned on the observed pair (additive, the paper's), the true perturbation of a clean pair
-(oracle), or a remedy applied to the observed pair (removal; supervised: with labels).
+The worth of a coalition of the concepts is the uncertainty with those present; that of the largest Shapley value is
+named. The protocols differ in what a feature is (docs/baselines.md): a knob turned on the observed pair (additive, the
+paper's), the true perturbation of a clean pair (oracle), or a remedy (removal; supervised: with labels).
 """
 
 from functools import partial

@@ -1,9 +1,7 @@
 """Trivial opponents: what a few numbers of a registration give away, with thresholds or weights fitted in training.
 
 A method's gain is its lead over the best of these, those of :mod:`baselines.untrained` and `density`. None looks at
-where the clouds differ: the fitted rule reads ICP's turn and how large a part was observed, `tree_trivial` (of depth 3)
-and `logistic_trivial` the ten numbers of :mod:`gpca.pairs.trivial`. `hypotheses` puts thresholds on the best hypothesis
-of a re-enactment's search, without any enactment.
+where the clouds differ. `hypotheses` puts thresholds on the best hypothesis of a re-enactment's search.
 """
 
 from collections.abc import Callable

@@ -17,10 +17,7 @@ Step = dict[str, float]
 
 
 class Retraining:
-    """Fits classifiers on growing sets of labels of a task.
-
-    A `warm` fit continues from the last one; `sees_pool`: it is standardized and started on the pool too.
-    """
+    """Fits classifiers on growing sets of labels: `warm` from the last one; `sees_pool`: started on the pool too."""
 
     def __init__(
         self,

@@ -110,8 +110,7 @@ def rounds(
     """Yield a step per round, the first before any label, and the rows of the pool labeled so far.
 
     A step has ``labels``, ``new_labels`` of the held-out concept, ``accuracy`` on all test samples, ``accuracy_new`` on
-    those of the held-out concept, and ``epochs`` of the retraining. The `gpc` of :func:`initial_gpc`, which projected
-    the task, is not changed.
+    those of the held-out concept, and ``epochs`` of the retraining. The `gpc`, which projected the task, is kept.
     """
     random = generator(*axes, "active_learning", task.held_out, strategy)
     gpc, needs_scores = copy(gpc), require_strategy(strategy).needs_scores

@@ -26,12 +26,9 @@ class BayesianLayer:
     """Softmax regression on the frozen encoder, after CLEVER (Lee et al. 2025); asks by the lack of confidence.
 
     The Gaussian posterior over the weights (C, F) after a label is the prior of the next: Laplace's approximation with
-    generalized Gauss-Newton curvature (Daxberger et al. 2021). A label changes the curvature by a matrix of rank C, so
-    that the logits of its sample determine the new weights in C dimensions (extended Kalman filter). A constant joins
-    the F - 1 features; where they have unit variance, `DEVIATION` is a logit's by the prior.
-
-    In place of CLEVER's progressive columns stands one linear layer, of the data of its prior the initial concepts, of
-    a demonstration one label, and of its thresholds the budget manager.
+    generalized Gauss-Newton curvature (Daxberger et al. 2021), in the C dimensions of the sample's logits (extended
+    Kalman filter). A constant joins the F - 1 features; where they have unit variance, `DEVIATION` is a logit's by the
+    prior. One linear layer stands in place of CLEVER's progressive columns, the budget manager in that of thresholds.
     """
 
     classes = CONCEPTS
@@ -127,11 +124,9 @@ def run_stream(
     """Run a stream; labels are learned at once, by a copy of `gpc`, which has projected the task, or another learner.
 
     ``stream_bald`` asks if BALD exceeds a quantile of the last `window` arrivals, adjusted to the budget (Balanced
-    Incremental Quantile Filter, Kottke et al. 2015); ``stream_clever`` so by its own uncertainty; ``stream_random``
-    asks at random.
-
-    A row per `every` arrivals has ``arrived``; ``present``, whether the quiet time is over; ``running`` accuracy over
-    the last `window` arrivals, each judged before its label; and a step of rounds.
+    Incremental Quantile Filter, Kottke et al. 2015); ``stream_clever`` so by its own uncertainty. A row per `every`
+    arrivals has ``arrived``; ``present``, whether the quiet time is over; ``running`` accuracy over the last `window`
+    arrivals, each judged before its label; and a step of rounds.
     """
     from skactiveml.stream import StreamRandomSampling
     from skactiveml.stream.budgetmanager import BalancedIncrementalQuantileFilter

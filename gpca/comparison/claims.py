@@ -121,9 +121,8 @@ def judge(
     """Return `CLAIM_COLUMNS`, a row per comparison, or one for a claim without any.
 
     A claim is supported if all of its comparisons are. It is refuted, or smaller than the margin, if one comparison is
-    by a Bonferroni interval (level divided by the number of comparisons). Values that the run lacks are "not run", and
-    those of stand-ins "not comparable"; the other comparisons then decide. Prediction files are for claims about
-    scores, draws of clusters for shares of samples. Floors are the minimum by unit.
+    by a Bonferroni interval (level divided by the number of comparisons). Where the run lacks values, or has those of
+    stand-ins, the other comparisons decide. Floors are the minimum by unit.
     """
     import pandas as pd
 

@@ -62,10 +62,9 @@ class Reproduced:
 
 
 def mean_bounds(mean: float, deviation: float, n: int, unit: Unit, samples: int = 0) -> tuple[float, float]:
-    """Return the 95 % interval of a mean of n repeats: Student's, of a ratio on its logarithm.
+    """Return the 95 % interval of a mean of n repeats: Student's, of a ratio on its logarithm; NaN for one repeat.
 
-    Where Student's has no width or passes what is possible, a share of samples has the farther bounds of it and of
-    Wilson's. NaN for one repeat.
+    Where it has no width or passes what is possible, a share of samples has the farther bounds of it and of Wilson's.
     """
     half_width = student_factor(n) * deviation / math.sqrt(n)
     if unit.ratio and mean > 0:

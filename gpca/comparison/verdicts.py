@@ -77,11 +77,7 @@ class Printed(NamedTuple):
 
 
 def printed_of(number: Number, deviation: Number | None = None) -> Printed:
-    """Return the number with its sampling interval.
-
-    Wilson's for a share of n samples, chi-square for a standard deviation of n repeats, Student's for a mean beside the
-    printed standard deviation of the same repeats.
-    """
+    """Return the number with its interval: Wilson's of a share, chi-square of a deviation, Student's of a mean."""
     if number.counterpart and number.counterpart.statistic == "deviation" and number.paper_n > 1:
         low, high = deviation_interval(number.value, number.paper_n)
     elif deviation and deviation.paper_n > 1:

@@ -15,6 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import cast
 
+import numpy as np
 import torch
 from torch import nn
 
@@ -104,7 +105,7 @@ class _Edges:
     def __init__(self, groups: Groups, points_B_N_3: torch.Tensor) -> None:
         self.batch, n_points, _ = points_B_N_3.shape
         # All must be contiguous, or numba compiles the kernels a second time.
-        neighbors, counts = (x.contiguous().numpy() for x in (groups.neighbors_B_M_k, groups.counts_B_M))
+        neighbors, counts = map(_numpy, (groups.neighbors_B_M_k, groups.counts_B_M))
         self.slots = neighbors.size
         self.point, self.weight, self.ends = kernels.distinct_edges(neighbors, counts, n_points)
         self.cloud_ends = self.ends[:: counts.shape[1]].copy()
@@ -156,13 +157,10 @@ class _Normalize(torch.autograd.Function):
 
 def farthest_points(points_B_N_3: torch.Tensor, n_centers: int) -> torch.Tensor:
     """Return the indices (B, M) of farthest-point sampling from point 0, which is random (PointNet++, Sec. 3.2)."""
-    points_B_N_3 = points_B_N_3.detach()
     batch, n, _ = points_B_N_3.shape
     if n <= n_centers:
         return torch.arange(n, device=points_B_N_3.device).expand(batch, n)
-    if points_B_N_3.device.type == "cpu":
-        return torch.from_numpy(kernels.farthest_points(points_B_N_3.contiguous().numpy(), n_centers)).long()
-    return _farthest_points_plain(points_B_N_3, n_centers)
+    return torch.from_numpy(kernels.farthest_points(_numpy(points_B_N_3), n_centers)).long().to(points_B_N_3.device)
 
 
 def ball_query(
@@ -172,13 +170,13 @@ def ball_query(
 
     Of fewer, the first one fills the remaining slots; the count is that of distinct points, at least one.
     """
-    points_B_N_3, centers_B_M_3 = points_B_N_3.detach(), centers_B_M_3.detach()
-    k = min(k, points_B_N_3.shape[1])
-    if points_B_N_3.device.type == "cpu":
-        points, centers = (x.contiguous().numpy() for x in (points_B_N_3, centers_B_M_3))
-        neighbors, counts = kernels.ball_query(points, centers, radius, k)
-        return torch.from_numpy(neighbors), torch.from_numpy(counts)
-    return _ball_query_plain(points_B_N_3, centers_B_M_3, radius, k)
+    k, device = min(k, points_B_N_3.shape[1]), points_B_N_3.device
+    neighbors, counts = kernels.ball_query(_numpy(points_B_N_3), _numpy(centers_B_M_3), radius, k)
+    return torch.from_numpy(neighbors).to(device), torch.from_numpy(counts).to(device)
+
+
+def _numpy(x: torch.Tensor) -> np.ndarray:
+    return x.detach().cpu().contiguous().numpy()
 
 
 def take(x_B_N_F: torch.Tensor, index_B_M: torch.Tensor) -> torch.Tensor:
@@ -186,25 +184,3 @@ def take(x_B_N_F: torch.Tensor, index_B_M: torch.Tensor) -> torch.Tensor:
     batch, n, _ = x_B_N_F.shape
     rows = index_B_M + n * torch.arange(batch, device=x_B_N_F.device).view(-1, *[1] * (index_B_M.ndim - 1))
     return x_B_N_F.reshape(batch * n, -1).index_select(0, rows.reshape(-1)).view(*index_B_M.shape, -1)
-
-
-def _farthest_points_plain(points_B_N_3: torch.Tensor, n_centers: int) -> torch.Tensor:
-    nearest_B_N = torch.full(points_B_N_3.shape[:2], torch.inf, dtype=points_B_N_3.dtype, device=points_B_N_3.device)
-    chosen = [torch.zeros(len(points_B_N_3), dtype=torch.long, device=points_B_N_3.device)]
-    for _ in range(n_centers - 1):
-        last_B_1_3 = take(points_B_N_3, chosen[-1][:, None])
-        nearest_B_N = torch.minimum(nearest_B_N, (points_B_N_3 - last_B_1_3).square().sum(-1))
-        chosen.append(nearest_B_N.argmax(dim=1))
-    return torch.stack(chosen, dim=1)
-
-
-def _ball_query_plain(points_B_N_3, centers_B_M_3, radius, k):
-    squares_B_M_N = (centers_B_M_3[:, :, None] - points_B_N_3[:, None]).square().sum(-1)
-    within_B_M_N = squares_B_M_N <= radius * radius
-    # Points outside sort behind all points inside; both keep their order.
-    n = points_B_N_3.shape[1]
-    order_B_M_N = torch.arange(n, device=points_B_N_3.device) + n * ~within_B_M_N
-    neighbors_B_M_k = order_B_M_N.topk(k, dim=-1, largest=False).values
-    neighbors_B_M_k = torch.where(neighbors_B_M_k < n, neighbors_B_M_k, neighbors_B_M_k[..., :1]) % n
-    counts_B_M = within_B_M_N.sum(-1).clamp(1, k)
-    return neighbors_B_M_k.int(), counts_B_M.int()

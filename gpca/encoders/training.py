@@ -1,9 +1,8 @@
 """Training an encoder with a head over the concepts (paper Sec. III-A), its files, and the embeddings."""
 
 import hashlib
-import zipfile
 from collections import OrderedDict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from copy import deepcopy
 from dataclasses import asdict
 from pathlib import Path
@@ -15,10 +14,8 @@ from torch import nn
 
 from gpca.encoders.registry import EncoderSettings, make_encoder
 from gpca.errors import InputError
-from gpca.io.array_tree import require_whole
 from gpca.io.arrays import require_numbers
 from gpca.io.files import Axes, require_axes, require_file, whole_file
-from gpca.numerals import LARGEST_NUMBER
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.portable import Adam, one_cycle
@@ -103,9 +100,7 @@ def train_encoder(
 
     With validation, the weights are those of the epoch with the smallest validation loss, and training may end early.
     Training resumes from a checkpoint of the same settings and data, from random weights or those of `start`. Rows of
-    one group (S,), by default of one object, are held out together. `make` gives an encoder beside the registry's.
-
-    Return the model, and for each epoch: epoch, learning_rate, loss, accuracy, and those of the validation.
+    one group (S,), by default of one object, are held out together. Return the model, and the curve, epoch by epoch.
     """
     torch.manual_seed(seed_of(source, seed, "encoder", settings.backbone))
     model = make_model(settings, classes, make and make()).to(best_device())
@@ -232,7 +227,7 @@ def _resume(checkpoint: Path | None, identity: str, state: dict) -> list[dict]:
     if checkpoint is None or not checkpoint.is_file():
         return []
     try:
-        content = read_tensors(checkpoint)
+        content = torch.load(checkpoint, weights_only=True, map_location="cpu")
     except Exception:  # whatever a damaged file makes torch raise, training from the start is right
         return []
     if not isinstance(content, dict) or content.get("identity") != identity or not set(state) <= set(content):
@@ -242,41 +237,11 @@ def _resume(checkpoint: Path | None, identity: str, state: dict) -> list[dict]:
     return content["curve"]
 
 
-def read_tensors(path: str | Path) -> Any:
-    """Return the content of a file of torch.save, on the CPU; ValueError for what is implausible, torch has others."""
-    with zipfile.ZipFile(path) as archive:
-        require_whole(archive, Path(path))
-    content = torch.load(path, weights_only=True, map_location="cpu")
-    for name, tensor in _tensors(content):
-        if tensor.layout != torch.strided or tensor.device.type != "cpu" or tensor.is_quantized or tensor.is_complex():
-            raise ValueError(f"'{name}' is a tensor of an unsupported kind")
-        if tensor.numel() * tensor.element_size() > tensor.untyped_storage().nbytes():
-            raise ValueError(f"'{name}' claims to be larger than its data in the file")
-        # gpytorch stores the bounds of its parameters, which may be infinite.
-        if tensor.is_floating_point() and not name.endswith("_bound") and not (tensor.abs() <= LARGEST_NUMBER).all():
-            raise ValueError(f"'{name}' contains NaN, infinity or numbers above {LARGEST_NUMBER:.0e}")
-    return content
-
-
 def write_tensors(path: str | Path, content: object) -> None:
     """Write a file, complete or not at all."""
     # Given a path, torch.save writes its name into the file; here that would be the temporary one.
     with whole_file(path) as partial, partial.open("wb") as file:
         torch.save(content, file)
-
-
-def _tensors(content: object) -> Iterator[tuple[str, torch.Tensor]]:
-    """Yield every tensor with its name; a list may contain itself, so each is visited once."""
-    seen: set[int] = set()
-    waiting = [("", content)]
-    while waiting:
-        name, part = waiting.pop()
-        if isinstance(part, torch.Tensor):
-            yield name, part
-        elif isinstance(part, Mapping | list | tuple) and id(part) not in seen:
-            seen.add(id(part))
-            parts = part.items() if isinstance(part, Mapping) else enumerate(part)
-            waiting += [(f"{name}.{key}" if name else str(key), inner) for key, inner in parts]
 
 
 def write_weights(path: str | Path, model: Classifier, axes: Axes) -> None:
@@ -292,7 +257,7 @@ def load_model(
     remedy = "regenerate them with Snakemake"
     require_file(path, "no such weights", remedy)
     try:
-        content = read_tensors(path)
+        content = torch.load(path, weights_only=True, map_location="cpu")
         trained_on = content["source"], content["seed"]
         model.load_state_dict(content["weights"])
     except Exception as fault:  # torch raises errors of many kinds for a damaged or foreign file

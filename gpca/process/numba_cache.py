@@ -1,7 +1,4 @@
-"""Numba with a cache of compiled loops per state of their code, imported when the first loop is compiled.
-
-Numba itself checks a function's own file only, not the modules that it imports.
-"""
+"""Numba with a cache of loops per state of their code and that of imported modules, which numba does not check."""
 
 from __future__ import annotations
 

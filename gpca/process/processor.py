@@ -34,10 +34,7 @@ def prepare(threads: int = 1) -> None:
 
 
 def pin_instructions() -> str:
-    """Limit the libraries that are loaded from now on to the common level, and return it.
-
-    Nothing is set, and "native" returned, if the processor lacks the level or GPCA_INSTRUCTIONS is "native".
-    """
+    """Limit the libraries that are loaded from now on to the common level, if it :func:`may_pin`; return the level."""
     if not may_pin():
         return "native"
     os.environ.update(_PINS)

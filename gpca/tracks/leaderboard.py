@@ -124,10 +124,7 @@ def _footnotes(published: Published, submitted: Mapping[str, Method]) -> tuple[s
 
 
 def as_text_among(published: Published, submitted: Mapping[str, Method]) -> str:
-    """Return the table of submitted methods among the published ones as text, of the groups that they predict.
-
-    Without submitted methods, it has all groups.
-    """
+    """Return the table of submitted methods among the published ones as text, of the groups that they predict."""
     scores, against = score(published, submitted)
     if submitted:
         groups = scores["group"][scores["method"].isin(list(submitted))]
@@ -189,10 +186,7 @@ def boards(submissions: Mapping[str, Sequence[Submission]]) -> list[dict[str, An
 
 
 def board_of(published: Published, submissions: Sequence[Submission], links: Mapping[str, str]) -> dict[str, Any]:
-    """Return the table of a track with submissions among the published rows, as the page shows it.
-
-    Its groups have rows of cells {text, bold, link}, of which the first is the method.
-    """
+    """Return the table of a track as the page shows it: groups of rows of cells {text, bold, link}, method first."""
     head_of = {submission.method.name: submission.head for submission in submissions}
     submitted = {submission.method.name: submission.method for submission in submissions}
     scores, _ = score(published, submitted)

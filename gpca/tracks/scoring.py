@@ -31,9 +31,8 @@ Group = tuple[str, np.ndarray, Clustered]
 def score(published: Published, submitted: Mapping[str, Method]) -> tuple[Frame, Frame]:
     """Score the published methods and submitted ones, whose names differ.
 
-    Returns `COLUMNS` for each group of samples, method and measure; and group, method and `AGAINST` for each pair of a
-    submitted method (``against``) and another: the other's headline minus the submitted one's. A method that lacks
-    scores for samples of a group has no row of it.
+    Returns `COLUMNS` for each group of samples, method with scores for all of them, and measure; and group, method and
+    `AGAINST` for each pair of a submitted method and another: the other's headline minus the submitted one's.
     """
     import pandas as pd
 

@@ -104,10 +104,7 @@ def try_on_few(samples: TrackSamples, name: str, entry: ExplainerEntry, settings
 
 
 def try_method(samples: TrackSamples, name: str, settings: Mapping[str, Any]) -> tuple[Method, float]:
-    """Return an explainer's predictions for all test samples of a track, and its seconds per registration.
-
-    Its inputs are measured beforehand, and their time is not counted.
-    """
+    """Return an explainer's predictions for all test samples of a track, and its seconds for each without inputs."""
     track, rows = samples.track, samples.published.rows
     require_settings(name, settings, track.kind, reenacted=track.name == HARD_TRACK)
     entry = explainer_entry(name, track.kind)

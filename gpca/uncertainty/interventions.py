@@ -1,8 +1,7 @@
 """Interventions on a pair whose uncertainty answers: perturbations as knobs, and remedies as switches.
 
-The registration's uncertainty is a function f(noise, spread, overlap) of the knobs (Qin et al. 2024), which SHAP and
-sensitivity analysis explain. Jitter, direction of the cut and starts are drawn once per pair. A remedy (denoising,
-broader restarts, trimming to the overlap) that lowers the uncertainty points to the cause.
+The uncertainty is a function f(noise, spread, overlap) of the knobs (Qin et al. 2024); jitter, direction of the cut and
+starts are drawn once per pair. A remedy that lowers the uncertainty points to the cause.
 """
 
 from dataclasses import replace

@@ -137,7 +137,7 @@ H = 2 * RANDOM.normal(size=(3, 8))[TARGETS] + RANDOM.normal(size=(60, 8))
 
 def direct(learner, h):
     """Draw the logits without registrations around them."""
-    learner._train(H, TARGETS)
+    learner._heads.fit(H, TARGETS)
     return learner._draw_logits(h)
 
 

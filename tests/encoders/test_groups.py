@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import torch
 
-from gpca.encoders import group_kernels, groups
+from gpca.encoders import group_kernels
 from gpca.encoders.groups import GroupMLP, Groups, ball_query, farthest_points, take
 from gpca.process.compilation import Loop
 
@@ -24,11 +24,10 @@ def in_ball_by_a_loop(points_N_3, center_3, radius, k):
     return found + found[:1] * (k - len(found)), len(found)
 
 
-@pytest.mark.parametrize("sample", [farthest_points, groups._farthest_points_plain])
-def test_farthest_points_are_those_of_a_plain_loop(sample):
+def test_farthest_points_are_those_of_a_plain_loop():
     points = clouds()
     expected = [farthest_by_a_loop(cloud.double().numpy(), 20) for cloud in points]
-    assert sample(points, 20).tolist() == expected
+    assert farthest_points(points, 20).tolist() == expected
 
 
 def test_of_a_small_cloud_every_point_is_a_center_and_coinciding_ones_only_when_no_other_is_left():
@@ -38,12 +37,11 @@ def test_of_a_small_cloud_every_point_is_a_center_and_coinciding_ones_only_when_
     assert farthest_points(points, 3).tolist() == [[0, 2, 0]]
 
 
-@pytest.mark.parametrize("query", [ball_query, groups._ball_query_plain])
 @pytest.mark.parametrize(("radius", "k"), [(0.05, 4), (0.3, 8), (0.3, 64), (2.0, 8)])
-def test_a_ball_holds_the_first_points_within_its_radius(query, radius, k):
+def test_a_ball_holds_the_first_points_within_its_radius(radius, k):
     points = clouds()
     centers = take(points, farthest_points(points, 10))
-    neighbors, counts = query(points, centers, radius, k)
+    neighbors, counts = ball_query(points, centers, radius, k)
     for cloud, found, of_cloud, centers_M_3 in zip(points, neighbors, counts, centers, strict=True):
         for indices, count, center in zip(found, of_cloud, centers_M_3, strict=True):
             assert (indices.tolist(), int(count)) == in_ball_by_a_loop(cloud.numpy(), center.numpy(), radius, k)

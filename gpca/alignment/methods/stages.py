@@ -29,7 +29,7 @@ ROUNDING = 1 + 1e-9  # the tree may sum a square in another order
 SAMPLED = 0.5  # share of the source's points
 DIRECTIONS = 64  # bins of normals, evenly on the sphere: about 25 degrees apart
 DEVIATIONS = 2.5  # standard deviations above the mean, beyond which a distance is rejected (Masuda 1996)
-ANGLE_DEG = 45.0  # between normals, beyond which a pair is rejected
+LEAST_COSINE = np.cos(np.deg2rad(45.0))  # of the angle between the normals of a pair that is kept
 WORST = 0.1  # share of the pairs that is rejected (Pulli 1999)
 LEAST_OVERLAP = 0.4  # lower end of the search for the overlap, as in the paper of trimmed ICP
 EXPONENT = 2.0  # λ of that paper, the preference for a larger overlap
@@ -188,31 +188,18 @@ def reject_distance(matches: Matches) -> Matches:
     return matches.kept(distance_n <= distance_n.mean() + DEVIATIONS * distance_n.std()) if len(distance_n) else matches
 
 
-def reject_normals(matches: Matches) -> Matches:
-    return matches.kept(matches.cosines() >= np.cos(np.deg2rad(ANGLE_DEG)))
-
-
 def reject_worst(matches: Matches) -> Matches:
     return matches.kept(nearest(matches.distance, round((1 - WORST) * len(matches.distance))))
-
-
-def weigh_distance(matches: Matches) -> np.ndarray:
-    """Return the weights 1 - d / d_max (n,) of Godin (1994)."""
-    return 1 - matches.distance / matches.limit
-
-
-def weigh_normals(matches: Matches) -> np.ndarray:
-    return np.clip(matches.cosines(), 0, 1)
 
 
 VARIANTS: dict[str, tuple[str, str, Callable]] = {  # title, and what one stage does instead
     "random_sampling": ("ICP, random sampling", "rows", sample_at_random),
     "normal_space": ("ICP, normal-space sampling", "rows", sample_normal_space),
     "reject_distance": ("ICP, rejection by distance", "reject", reject_distance),
-    "reject_normals": ("ICP, rejection by normals", "reject", reject_normals),
+    "reject_normals": ("ICP, rejection by normals", "reject", lambda of: of.kept(of.cosines() >= LEAST_COSINE)),
     "reject_worst": ("ICP, rejection of the worst", "reject", reject_worst),
-    "weight_distance": ("ICP, weights by distance", "weigh", weigh_distance),
-    "weight_normals": ("ICP, weights by normals", "weigh", weigh_normals),
+    "weight_distance": ("ICP, weights by distance", "weigh", lambda of: 1 - of.distance / of.limit),  # Godin 1994
+    "weight_normals": ("ICP, weights by normals", "weigh", lambda of: np.clip(of.cosines(), 0, 1)),
 }
 METHODS = {"trimmed": MethodEntry("Trimmed ICP", align_trimmed, points_only=True)} | {
     name: MethodEntry(title, partial(align_variant, stage, change)) for name, (title, stage, change) in VARIANTS.items()

@@ -211,13 +211,10 @@ def example(
     draw: Callable[[], np.ndarray],
     runs: int,
 ) -> Example:
-    """Return a training registration with the results of a few others, as `draw` gives their twists (n, 6) about it.
-
-    Where too few of the `runs` have any result, the twists are zeros, as if all were at the pose.
-    """
+    """Return a training registration with the twists (n, 6) of a few others about it, as `draw` gives them."""
     try:
         twists_n_6 = draw()
-    except FailedEstimate:
+    except FailedEstimate:  # too few of the runs have any result
         twists_n_6 = np.zeros((runs, 6))
     described = describe(registered.pair, registered.outcome, moved)
     truth_6 = true_twist(registered, T_true, judge, moved)

@@ -27,9 +27,9 @@ def learn_cello(
 ) -> Estimator:
     """Learn a metric of descriptors that finds similar training pairs (CELLO-3D, Landry et al., ICRA 2019).
 
-    The covariance is the mean of the training pairs' covariances with weights exp(-|L (φ - φ')|²). L is diagonal,
-    chosen so that the runs of each training pair are likely under the covariance that the others give it. Axes of pairs
-    have no common sign, so that six variances along the principal axes of the target are learned.
+    The covariance is the mean of the training pairs' ones with weights exp(-|L (φ - φ')|²), L diagonal, such that the
+    runs of each training pair are likely under the covariance that the others give it; six variances along the
+    principal axes of the target, as axes of pairs have no common sign.
     """
     import torch
 

@@ -78,7 +78,7 @@ def test_a_share_counts_all_points_of_the_source(objects):
     assert 0 < len(Stages(share=0.5, distance=distance).match(pair, T_true).distance) <= len(pair.source) / 2
 
 
-OFF = {"SAMPLED": 1.0, "DEVIATIONS": 1e6, "ANGLE_DEG": 180.0, "WORST": 0.0}
+OFF = {"SAMPLED": 1.0, "DEVIATIONS": 1e6, "LEAST_COSINE": -2.0, "WORST": 0.0}
 
 
 @pytest.mark.parametrize("name", [name for name, (_, stage, _) in VARIANTS.items() if stage != "weigh"])
@@ -117,8 +117,8 @@ def test_rejections_keep_what_they_say_and_weights_fall_with_distance_and_angle(
         assert 0 < len(part.distance) < len(d)
         np.testing.assert_allclose(np.linalg.norm(pair.target[part.rows] - part.source, axis=1), part.distance)
 
-    np.testing.assert_allclose(stages.weigh_distance(matches), 1 - matches.distance / 0.1)
-    weights = stages.weigh_normals(matches)
+    np.testing.assert_allclose(VARIANTS["weight_distance"][2](matches), 1 - matches.distance / 0.1)
+    weights = VARIANTS["weight_normals"][2](matches)
     assert np.array_equal(weights[cosines > 0], np.minimum(cosines[cosines > 0], 1)) and not weights[cosines < 0].any()
 
 
