@@ -92,10 +92,8 @@ class Step:
 
 @dataclass(frozen=True)
 class Rule:
-    """A rule of the workflow, in the words of Snakemake; files are below the folder of a run."""
+    """What a rule needs besides its step, in the words of Snakemake; files are below the folder of a run."""
 
-    name: str
-    run: str
     inputs: dict[str, Any]
     data: dict[str, Any]  # inputs from outside the run
     modules: Any  # of its code
@@ -104,9 +102,6 @@ class Rule:
     params: dict[str, Any]
     constraints: dict[str, str]
     place: str  # of its log and its benchmark
-    priority: int
-    threads: int
-    resources: dict[str, Any]
 
 
 def plural(name: str) -> str:
@@ -132,8 +127,6 @@ def rule_of(step: Step, plan: Plan) -> Rule:
         return lambda wildcards: function(*given, wildcards)
 
     return Rule(
-        name=step.name,
-        run=step.run,
         inputs={
             key: later(_resolved, step, plan, files) if callable(files) else _files(step, plan, files)
             for key, files in step.inputs.items()
@@ -152,9 +145,6 @@ def rule_of(step: Step, plan: Plan) -> Rule:
             if wildcard != "seed" and values[wildcard] is not None
         },
         place="/".join([step.name, *(f"{{{wildcard}}}" for wildcard in wildcards)]),
-        priority=step.priority,
-        threads=step.threads,
-        resources=dict(step.resources),
     )
 
 

@@ -67,10 +67,7 @@ def calibrate_sets(
     """Calibrate sets that contain the true state of a new sample with a probability of at least `level`."""
     require_share("level of the sets", level)
     require_scores(scores_N_K, states)
-    is_state_N_K = np.asarray(state_N)[:, None] == np.array(states)
-    if not (valid_N := is_state_N_K.any(axis=1)).all():
-        raise InputError(f"state '{state_N[~valid_N][0]}'", "unknown", f"choose one of {', '.join(states)}")
-    number_N = is_state_N_K.argmax(axis=1)
+    number_N = (np.asarray(state_N)[:, None] == np.array(states)).argmax(axis=1)
     value_N = 1 - scores_N_K[np.arange(len(number_N)), number_N]
     masks = [number_N == number if by_state else np.ones(len(value_N), bool) for number in range(len(states))]
     limits = (upper_bound(value_N[mask_N], level, None if family_N is None else family_N[mask_N]) for mask_N in masks)
@@ -88,7 +85,6 @@ class FailureAlarm:
 
     def of(self, failure_M: np.ndarray) -> np.ndarray:
         """Return the call of each registration, one of `OUTCOMES`, by its score of failure."""
-        require_failures(failure_M)
         return np.select([failure_M < self.good_below, failure_M >= self.failed_from], [GOOD, ALARM], NOT_SURE)
 
 
@@ -108,7 +104,6 @@ def calibrate_alarm(
     """
     require_share("risk of missed failures", missed)
     require_share("risk of false alarms", false_alarms)
-    require_failures(failure_N)
 
     def bound(value_N: np.ndarray, mask_N: np.ndarray, risk: float) -> float:
         return upper_bound(value_N[mask_N], 1 - risk, None if family_N is None else family_N[mask_N])
@@ -129,8 +124,3 @@ def require_scores(scores_N_K: np.ndarray, states: Sequence[str]) -> None:
     if scores_N_K.ndim != 2 or scores_N_K.shape[1] != len(states) or not np.isfinite(scores_N_K).all():
         fault = f"have the shape {scores_N_K.shape} or are not finite"
         raise InputError("scores", fault, f"give a finite number for each of {', '.join(states)}")
-
-
-def require_failures(failure_N: np.ndarray) -> None:
-    if failure_N.ndim != 1 or not np.isfinite(failure_N).all():
-        raise InputError("scores of failure", "are not one finite number for each sample", "leave out the others")

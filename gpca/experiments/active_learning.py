@@ -181,7 +181,7 @@ def _table(
     metrics = metrics.assign(setting=metrics["table"].str.removeprefix(TABLE))
     cell = label_cells(run.config["registrations"]["test"], clusters)
     sheet = Sheet(name, {head: HEADS[head] for head in heads}, rows, columns, metrics, cell=cell)
-    over = f"{cautious_over(sheet.most_seeds(), run.config['registrations']['test'])}."
+    over = f"{cautious_over(sheet.seeds, run.config['registrations']['test'])}."
     caption += run.stand_ins(partly=False)
     return sheet.table(caption, "quantity", (over, *notes), keep_empty=True, **compared)
 

@@ -34,10 +34,7 @@ def lead(intervals: Frame, titles: Mapping[str, str]) -> str:
     if (TRAINED, "balanced_accuracy") not in rows.index:
         return ""
     nominal, failed = rows.loc[""].loc[["false_alarm_rate", "dominant_accuracy"], "samples"]
-    return _lead(rows.loc[(TRAINED, "balanced_accuracy")], int(min(nominal, failed // len(CONCEPTS))), titles)
-
-
-def _lead(row: Mapping, fewest: int, titles: Mapping[str, str]) -> str:
+    row, fewest = rows.loc[(TRAINED, "balanced_accuracy")], int(min(nominal, failed // len(CONCEPTS)))
     title, other = (titles[row[name]] for name in ("method", "other"))
     value, low, high = (100 * row[name] for name in ("value", "low", "high"))
     best = f"{other}, the best explainer that is trained and reads no re-enactment"

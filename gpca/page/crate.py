@@ -18,12 +18,9 @@ SPECIFICATION = "https://w3id.org/ro/crate/1.1"
 PROFILE = "https://w3id.org/ro/wfrun/process/0.5"
 CONTEXT = (f"{SPECIFICATION}/context", "https://w3id.org/ro/terms/workflow-run/context")
 PAPER = "https://arxiv.org/abs/2509.18786"
-LICENSE = {
-    "@id": "https://spdx.org/licenses/MIT",
-    "@type": "CreativeWork",
-    "name": "MIT",
-    "description": "The suite is under the MIT license; the datasets that the run read keep their own licenses.",
-}
+PAPERS_TITLE = "Human-Interpretable Uncertainty Explanations for Point Cloud Registration"
+MIT = "https://spdx.org/licenses/MIT"
+RIGHTS = "The suite is under the MIT license; the datasets that the run read keep their own licenses."
 FORMS = {".npz": "application/zip", ".pt": "application/zip"}  # unknown to Python
 
 
@@ -61,80 +58,68 @@ def read_jobs(folder: Path) -> list[dict[str, Any]]:
 
 def crate(jobs: Sequence[Mapping[str, Any]], name: str, description: str) -> dict[str, Any]:
     """Return the metadata document: ``@context`` and the flat ``@graph`` of entities that refer to each other."""
+    graph: dict[str, dict[str, Any]] = {}
+
+    def entity(identifier: str, kind: str, **facts: Any) -> dict[str, str]:
+        graph[identifier] = {"@id": identifier, "@type": kind, **facts}
+        return {"@id": identifier}
+
     hashes = {path: digest for job in jobs for path, digest in job["inputs"].items()}
-    parts = sorted({path for job in jobs for path in job["outputs"]})
-    identifiers = {path: f"#input-{digest[:16]}" for path, digest in hashes.items()} | {path: path for path in parts}
-    entities: list[dict[str, Any]] = []
-    for path in parts:
+    parts = {}
+    for path in sorted({path for job in jobs for path in job["outputs"]}):
         form = FORMS.get(Path(path).suffix) or mimetypes.guess_type(path)[0]
-        entity = {"@id": path, "@type": "Dataset" if path.endswith("/") else "File", "name": path}
-        entity |= {"encodingFormat": form} if form else {}
-        entities.append(entity | ({"sha256": hashes[path]} if path in hashes else {}))
-    entities += [
-        {"@id": identifiers[path], "@type": "CreativeWork", "name": Path(path).name, "sha256": digest}
+        known = {"encodingFormat": form, "sha256": hashes.get(path)}
+        kind = "Dataset" if path.endswith("/") else "File"
+        parts[path] = entity(path, kind, name=path, **{fact: value for fact, value in known.items() if value})
+    files = parts | {
+        path: entity(f"#input-{digest[:16]}", "CreativeWork", name=Path(path).name, sha256=digest)
         for path, digest in hashes.items()
-        if identifiers[path] != path
-    ]
-    entities += [_software(job) for job in jobs]
-    entities += [_library(*library) for job in jobs for library in job["libraries"].items()]
+        if path not in parts
+    }
     actions = []
     for job in jobs:
+        libraries = [
+            entity(f"#{name}-{version.replace('+', '-')}", "SoftwareApplication", name=name, softwareVersion=version)
+            for name, version in job["libraries"].items()
+        ]
+        commit, state = job["code"]["commit"] or "", "changed" if job["code"]["dirty"] else ""
+        version = job["code"]["version"]
+        software = entity(
+            "#" + "-".join(filter(None, ("gpca-bench", version, commit[:12], state))),
+            "SoftwareApplication",
+            name="GP-CA Bench",
+            softwareVersion=", ".join(filter(None, (version, commit and f"commit {commit}", state))),
+            softwareRequirements=_one_or_all(libraries),
+        )
         first, *others = outputs = job["outputs"]
-        action = {
-            "@id": f"#job-{sha256(' '.join(outputs).encode()).hexdigest()[:16]}",
-            "@type": "CreateAction",
-            "name": f"Making {first}{f' and {len(others)} more' if others else ''}",
-            "description": f"{float(job['seconds']):g} s; settings and machine are in {first.rstrip('/')}{RECORD}",
-            "endTime": job["ended"].isoformat(),
-            "instrument": {"@id": _software(job)["@id"]},
-            "object": _references(identifiers[path] for path in job["inputs"]),
-            "result": _references(outputs),
-        }
+        action = entity(
+            f"#job-{sha256(' '.join(outputs).encode()).hexdigest()[:16]}",
+            "CreateAction",
+            name=f"Making {first}{f' and {len(others)} more' if others else ''}",
+            description=f"{float(job['seconds']):g} s; settings and machine are in {first.rstrip('/')}{RECORD}",
+            endTime=job["ended"].isoformat(),
+            instrument=software,
+            object=_one_or_all(files[path] for path in job["inputs"]),
+            result=_one_or_all(files[path] for path in outputs),
+        )
         actions.append(action)
-    title = "Human-Interpretable Uncertainty Explanations for Point Cloud Registration"
-    described: list[dict[str, Any]] = [
-        {"@id": NAME, "@type": "CreativeWork", "about": {"@id": "./"}, "conformsTo": {"@id": SPECIFICATION}},
-        {
-            "@id": "./",
-            "@type": "Dataset",
-            "name": name,
-            "description": description,
-            "datePublished": max(job["ended"] for job in jobs).date().isoformat(),
-            "license": {"@id": LICENSE["@id"]},
-            "conformsTo": {"@id": PROFILE},
-            "citation": {"@id": PAPER},
-            "hasPart": _references(parts),
-            "mentions": _references(action["@id"] for action in actions),
-        },
-        {"@id": PROFILE, "@type": "CreativeWork", "name": "Process Run Crate", "version": "0.5"},
-        {"@id": PAPER, "@type": "ScholarlyArticle", "name": title},
-        LICENSE,
-    ]
-    graph = {entity["@id"]: entity for entity in (*described, *entities, *actions)}
+    root = entity(
+        "./",
+        "Dataset",
+        name=name,
+        description=description,
+        datePublished=max(job["ended"] for job in jobs).date().isoformat(),
+        license=entity(MIT, "CreativeWork", name="MIT", description=RIGHTS),
+        conformsTo=entity(PROFILE, "CreativeWork", name="Process Run Crate", version="0.5"),
+        citation=entity(PAPER, "ScholarlyArticle", name=PAPERS_TITLE),
+        hasPart=_one_or_all(parts.values()),
+        mentions=_one_or_all(actions),
+    )
+    entity(NAME, "CreativeWork", about=root, conformsTo={"@id": SPECIFICATION})
     return {"@context": list(CONTEXT), "@graph": list(graph.values())}
 
 
-def _software(job: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the suite in one state of its code."""
-    code = job["code"]
-    commit = f", commit {code['commit']}" if code["commit"] else ""
-    changed = " with uncommitted changes" if code["dirty"] else ""
-    parts = ["gpca-bench", code["version"], (code["commit"] or "")[:12], "changed" if code["dirty"] else ""]
-    return {
-        "@id": f"#{'-'.join(filter(None, parts))}",
-        "@type": "SoftwareApplication",
-        "name": "GP-CA Bench",
-        "softwareVersion": f"{code['version']}{commit}{changed}",
-        "softwareRequirements": _references(_library(*library)["@id"] for library in job["libraries"].items()),
-    }
-
-
-def _library(name: str, version: str) -> dict[str, Any]:
-    identifier = f"#{name}-{version.replace('+', '-')}"
-    return {"@id": identifier, "@type": "SoftwareApplication", "name": name, "softwareVersion": version}
-
-
-def _references(identifiers: Iterable[str]) -> dict[str, str] | list[dict[str, str]]:
-    """Return references to entities; one alone is no list, as RO-Crate wants it."""
-    references = [{"@id": identifier} for identifier in dict.fromkeys(identifiers)]
-    return references[0] if len(references) == 1 else references
+def _one_or_all(references: Iterable[dict[str, str]]) -> dict[str, str] | list[dict[str, str]]:
+    """Return each reference once; one alone is no list, as RO-Crate wants it."""
+    distinct = list({reference["@id"]: reference for reference in references}.values())
+    return distinct[0] if len(distinct) == 1 else distinct

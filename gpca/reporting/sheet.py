@@ -103,11 +103,6 @@ class Sheet(TableBuilder):
                 self.rows.append(row)
         self.require_rows()
 
-    @property
-    def seeds(self) -> int:
-        """Number of seeds of the cell that has the most."""
-        return self.most_seeds()
-
     def samples(self, *keys: str, row: int = 0) -> str:
         """Numbers of test samples of some columns' cells in a row, such as ``15 to 200``."""
         return span(self.cells[row, key].test_samples for key in keys if (row, key) in self.cells)

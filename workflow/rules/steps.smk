@@ -23,7 +23,7 @@ for step in steps():
 
         rule:
             name:
-                made.name
+                step.name
             input:
                 **below_results(made.inputs),
                 **made.data,
@@ -36,15 +36,15 @@ for step in steps():
                 f"<benchmarks>/{made.place}.tsv"
             wildcard_constraints:
                 **made.constraints,
-            priority: made.priority
+            priority: step.priority
             conda:
                 "../envs/gpca.yaml"
-            threads: made.threads
+            threads: step.threads
             resources:
-                **made.resources,
+                **step.resources,
             params:
                 **made.params,
-                step=made.run,
+                step=step.run,
                 settings=made.settings,
             script:
                 "../scripts/step.py"

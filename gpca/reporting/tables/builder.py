@@ -55,9 +55,9 @@ class TableBuilder:
             fault = "has nothing to show: its files hold no numbers of what the config names"
             raise InputError(f"table '{self.name}'", fault, "run that first")
 
-    def most_seeds(self) -> int:
-        """Return over how many seeds the cell with the most of them is a mean."""
-        self.require_rows()
+    @property
+    def seeds(self) -> int:
+        """Number of seeds of the cell that has the most."""
         return max(cell.seeds for cell in self.cells.values())
 
     def build(self, caption: str, column_head: str, columns: Mapping[str, Column], footnotes: Iterable[str]) -> Table:
@@ -79,17 +79,11 @@ class TableBuilder:
 
 
 # Starts of footnotes, without a full stop. Numbers of samples are of each seed.
-def mean_over(seeds: int | str, samples: int | str) -> str:
-    """Return how most tables begin theirs."""
-    return f"Mean over {plural(seeds, 'seed')}, {samples} test samples each; {interval_over(seeds)}"
-
-
-def interval_over(seeds: int | str) -> str:
-    """Return what ± means in a table of means over these seeds, such as ``5`` or ``1 to 3``."""
-    fewest, most = (int(str(seeds).split()[place]) for place in (0, -1))
-    if most < LEAST_SEEDS:
-        return f"with fewer than {LEAST_SEEDS} there is no interval and no bold"
-    return INTERVAL if fewest >= LEAST_SEEDS else f"{INTERVAL} (none for fewer than {LEAST_SEEDS})"
+def mean_over(seeds: int, samples: int) -> str:
+    """Return that on means with the interval over their seeds."""
+    none = f"with fewer than {LEAST_SEEDS} there is no interval and no bold"
+    over = f"Mean over {plural(seeds, 'seed')}, {samples} test samples each"
+    return f"{over}; {INTERVAL if seeds >= LEAST_SEEDS else none}"
 
 
 def over_clusters(seeds: int | str, samples: int | str = "", clusters: str = FAMILIES) -> str:
@@ -101,15 +95,12 @@ def over_clusters(seeds: int | str, samples: int | str = "", clusters: str = FAM
     )
 
 
-def cautious_over(seeds: int | str, samples: int | str) -> str:
+def cautious_over(seeds: int, samples: int) -> str:
     """Return that on means over seeds whose single answers are not kept (:func:`cautious_cell`)."""
-    over = f"Mean over {plural(seeds, 'seed')}, {samples} test samples each"
-    of_accuracies = "In brackets, of accuracies, of which no single answers are kept:"
     wilson = "Wilson's interval, for which a family of objects counts once in each seed (docs/comparison.md)"
-    if int(str(seeds).split()[-1]) < LEAST_SEEDS:
-        without = f"with fewer than {LEAST_SEEDS} all else has no interval and no bold"
-        return f"{over}; {without}. {of_accuracies} {wilson}"
-    return f"{over}; {interval_over(seeds)}. {of_accuracies} the farther bounds of that and of {wilson}"
+    bounds = wilson if seeds < LEAST_SEEDS else f"the farther bounds of that and of {wilson}"
+    over = mean_over(seeds, samples).replace("there is no", "all else has no")
+    return f"{over}. In brackets, of accuracies, of which no single answers are kept: {bounds}"
 
 
 def missing_packages(left_out: Mapping[str, str]) -> list[str]:
