@@ -44,7 +44,7 @@ class Section(ActiveLearningSettings):
 
     held_out: Distinct[Concept]
     target: PositiveShare
-    rare: RareSettings | None = None
+    rare: RareSettings
     without: EncoderChanges
     stream: StreamSettings
     strategies: Distinct[str]
@@ -80,10 +80,9 @@ def learning_settings(plan: Plan) -> dict[str, Any]:
 def _seed_settings(plan: Plan, wildcards: Any) -> dict[str, Any]:
     """Settings of a seed; seeds beyond the first few have one share of a rare concept."""
     settings = learning_settings(plan)
-    rare = settings.get("rare")
-    if not rare or int(wildcards.seed) in plan.config["seeds"][: rare.get("beside_seeds")]:
-        return settings
-    return settings | {"rare": rare | {"shares": rare["shares"][:1]}}
+    rare = settings["rare"]
+    beside = int(wildcards.seed) in plan.config["seeds"][: rare.get("beside_seeds")]
+    return settings if beside else settings | {"rare": rare | {"shares": rare["shares"][:1]}}
 
 
 EMBED_WITHOUT = Step(
@@ -134,7 +133,7 @@ CURVES = {"curve_files": "active_learning/{source}/{pool_strategy}/seed{seed}.cs
 )
 def table3_active_learning(run: Run, metrics: Frame, clusters: Clusters) -> Table:
     learning = run.config["active_learning"]
-    shares = learning["rare"]["shares"] if learning["rare"] else ()
+    shares = learning["rare"]["shares"]
     settings = {rare_setting(share): f"all concepts; {100 * share:g} % of the pool new" for share in shares} | SETTINGS
     chosen = {"bald_kmeans": "BALD + k-means", "bald": "BALD", "random": "random"}
     labels = {
@@ -149,8 +148,8 @@ def table3_active_learning(run: Run, metrics: Frame, clusters: Clusters) -> Tabl
     rows = crossed(("source", run.source_titles), ("setting", settings))
     inputs = metrics[metrics["concept"] == PAPERS_HELD_OUT], clusters
     notes = [
-        *_rare_note(learning),
-        f"{'Other rows: ' if shares else ''}{_protocol(run)} Retraining moves the posterior alone, in at most "
+        _rare_note(learning),
+        f"Other rows: {_protocol(run)} Retraining moves the posterior alone, in at most "
         f"{learning['iterations']} passes over the labels. Epochs: passes that reached the target. Acc.: after all "
         "labels.",
     ]
@@ -293,14 +292,13 @@ def _protocol(run: Run) -> str:
     )
 
 
-def _rare_note(learning: Mapping) -> list[str]:
-    if not (rare := learning["rare"]):
-        return []
+def _rare_note(learning: Mapping) -> str:
+    rare = learning["rare"]
     gpc, few = rare["gpc"], rare.get("beside_seeds")
     beside = f" Shares but the first: over at most the first {plural(few, 'seed')}." if few else ""
-    return [
+    return (
         "Where so many percent of the pool are new (5 % are compared with the paper), the paper's classifier "
         f"({gpc['kernel']}, rate {gpc['learning_rate']:g}, {gpc['iterations']} passes) is fitted anew in each round "
         f"(docs/comparison.md): of {rare['batch']} labels, of {rare['late_batch']} from {rare['least']} on, at most "
         f"{rare['labels']}. Epochs are counted in steps of {LOOK_EVERY}.{beside}"
-    ]
+    )

@@ -9,7 +9,6 @@ import numpy as np
 
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.declarations import Experiment, Frame, Paths, Run, Tidy, table
-from gpca.errors import InputError
 from gpca.evaluation.intervals import Clustered
 from gpca.evaluation.measures import ALL, Measure, by_value, over_seeds, read_all_metrics, read_samples
 from gpca.explainers.gpca import GPCA_FORMS
@@ -40,11 +39,7 @@ def collect_intervals(prediction_files: Paths) -> Frame:
     import pandas as pd
 
     def read(path: Path) -> Frame:
-        rows = read_predictions(path)
-        rows = rows[rows["split"] == "test"]
-        if rows.empty:
-            raise InputError(path, "has no test rows", "regenerate it")
-        return rows
+        return read_predictions(path).query("split == 'test'")
 
     def by_concept(rows: Frame) -> dict[str, np.ndarray]:
         return by_value(rows, "concept_true", concepts_of(rows))

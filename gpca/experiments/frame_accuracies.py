@@ -9,7 +9,6 @@ from gpca.attribution.diagnostics import brier_score, calibration_error, negativ
 from gpca.attribution.metrics import attribution_metrics
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.declarations import Frame, Paths, Run, numbers
-from gpca.errors import InputError
 from gpca.evaluation.intervals import Clustered
 from gpca.evaluation.measures import ALL, intervals, source_method_seed, tidy
 from gpca.experiments.frame_labels import collect_labels
@@ -33,12 +32,10 @@ FRAME_FILES = {
 def collect(
     run: Run, prediction_files: Paths, pose_files: Paths, one_encoder_files: Paths = (), label_files: Paths = ()
 ) -> Frame:
-    """Metrics by seed of prediction files.
+    """Metrics by seed of prediction files, below them of classifiers on one encoder's embeddings, and of labels.
 
     The column `table` says of which test samples (:func:`parts_by_file`). Beside the metrics of
-    :func:`gpca.attribution.metrics.collect` stand the calibration error `ece`, the number of `objects`, and the proper
-    scores `nll` (nats) and `brier`. Classifiers on one encoder's embeddings, and labels
-    (:func:`gpca.experiments.frame_labels.collect_labels`), stand below.
+    :func:`gpca.attribution.metrics.collect` stand `ece`, the number of `objects`, `nll` (nats) and `brier`.
     """
     import pandas as pd
 
@@ -47,9 +44,9 @@ def collect(
         for name, test in parts.items():
             true_N = np.array([concepts.index(concept) for concept in test["concept_true"]])
             scores = test[[f"score_{concept}" for concept in concepts]].to_numpy(float), true_N
-            metrics = attribution_metrics(test, concepts)
-            metrics |= {"ece": {ALL: calibration_error(*scores)}, "objects": {ALL: test["object"].nunique()}}
-            metrics |= {"nll": {ALL: negative_log_likelihood(*scores)}, "brier": {ALL: brier_score(*scores)}}
+            of_all = {"ece": calibration_error(*scores), "objects": test["object"].nunique()}
+            of_all |= {"nll": negative_log_likelihood(*scores), "brier": brier_score(*scores)}
+            metrics = attribution_metrics(test, concepts) | {metric: {ALL: v} for metric, v in of_all.items()}
             for metric, of_concept in metrics.items():
                 records += [(name, source, method, metric, c, seed, float(v)) for c, v in of_concept.items()]
     for path in one_encoder_files:
@@ -67,22 +64,14 @@ def parts_by_file(
     """Source, method, seed and concepts of each file of predictions, and its test rows by part.
 
     ``attribution`` is all of them, ``seen`` those of objects that a training sample shows, ``unseen`` the others,
-    ``dataset/{name}`` those of one dataset's frames. A part without any row is left out.
+    ``dataset/{name}`` those of one dataset's frames.
     """
     poses = {(Path(path).parts[-2], Path(path).stem): path for path in pose_files}
     for path in prediction_files:
         source, method, seed = source_method_seed(path)
-        if (pose_file := poses.get((source, f"seed{seed}"))) is None:
-            raise InputError(path, "has no pose file beside it", "regenerate both from the same config")
-        rows = read_predictions(path)
+        rows, samples = read_predictions(path), read_samples_of_frames(poses[source, f"seed{seed}"])
         test = rows[rows["split"] == "test"]
-        if test.empty:
-            raise InputError(path, "has no test rows", "regenerate it")
-        samples = read_samples_of_frames(pose_file)
-        samples = samples[samples["split"] == "test"].set_index("sample")
-        if not set(test["sample"]) <= set(samples.index):
-            raise InputError(pose_file, f"lacks samples of {path}", "regenerate both from the same config")
-        shown = samples.loc[test["sample"]]
+        shown = samples[samples["split"] == "test"].set_index("sample").loc[test["sample"]]
         in_training, dataset = shown["in_training"].to_numpy(bool), shown["dataset"].to_numpy()
         chosen = {TOGETHER: np.ones(len(test), bool), SEEN: in_training, UNSEEN: ~in_training}
         chosen |= {f"{DATASET}{name}": dataset == name for name in np.unique(dataset)}
@@ -93,11 +82,8 @@ def parts_by_file(
 def collect_intervals(run: Run, prediction_files: Paths, pose_files: Paths) -> Frame:
     """Accuracies of `real_world.csv` over all seeds, with 95 % intervals (:mod:`gpca.evaluation.measures`).
 
-    - accuracy: of every part of the test samples that the column `table` names; of all of them by concept as well.
-    - difference: of that of all from the first method's in the same seeds, on the same draws, where both have the same
-      samples.
-
-    Clusters are scenes; the draws of a source are the same for all methods.
+    A ``difference`` is from the first method in the same seeds, where both have the same samples. Clusters are scenes;
+    the methods of a source share the draws.
     """
     import pandas as pd
 

@@ -64,12 +64,9 @@ def test_values_are_those_of_the_metrics_with_intervals_over_families_and_seeds(
     assert ((collected["low"] < collected["value"]) & (collected["value"] < collected["high"])).all()
 
 
-def test_faults_are_one_line(files):
+def test_faults_are_one_line():
     with pytest.raises(InputError, match="no files were given"):
         collect_intervals([])
-    write_csv(files[1], predictions(1).iloc[-1:])
-    with pytest.raises(InputError, match="has no test rows"):
-        collect_intervals(files)
 
 
 REAL = {"linemod": {"title": "LINEMOD", "stand_in": False}, "ycb": {"title": "YCB", "stand_in": False}}
