@@ -11,9 +11,11 @@ from gpca.causes.candidate import replay
 from gpca.causes.dataset import LABELS, Causes
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import ALL, BY_SIZE, FAILED, SUBSETS, shapley_values
-from gpca.declarations import Figure, Paths
+from gpca.declarations import Figure, Paths, Run, figure
 from gpca.errors import InputError
 from gpca.evaluation.measures import source_method_seed
+from gpca.experiments.cause_tables import COMPARED, SECTION
+from gpca.experiments.diagnosis import cause_titles
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.perturbation import CONCEPTS, NOISE, OVERLAP
 from gpca.reenactment.settings import ReenactmentSettings
@@ -25,6 +27,7 @@ from gpca.reporting.figures.style import CONCEPT_COLORS, SMALL_PT, TEXT_WIDTH_IN
 from gpca.reporting.words import object_in_words
 from gpca.rigid import transform
 from gpca.seeds import seed_of_file
+from gpca.settings import read_settings
 
 HEAD_IN, SOLID_IN = 0.3, 2.1
 PIXELS = 640  # of a solid, on each side
@@ -36,27 +39,28 @@ WORDS = {subset: " + ".join(CONCEPTS[i] for i in SUBSETS[subset]) or "none" for 
 GAP = 0.5  # of a row, between the measured shares and the scores, which are none
 
 
-def draw_causes_example(
-    objects_npz: str | Path,
-    causes_npz: str | Path,
-    predictions_csv: Paths,
-    settings: CauseSettings,
-    explainers: Mapping[str, str],
-    title: str,
-    dataset: str = "",
-) -> Figure:
-    """Draw the registration with all causes, without the one that does most and without any; below these, what each
-    cause adds to the error v, and the scores of the explainers. The paths name the shown source and seed.
-    """
+@figure(
+    SECTION,
+    "One failed registration and its counterfactuals",
+    """A failed registration of several causes, registered again with every subset of these: Shapley's value φ of a
+    cause is what it added to the error. Below are the scores of some explainers, which saw only the registration with
+    all causes, and who names the dominant cause (right), one that adds nearly as much (tie) or another (wrong). Shown
+    is the failure with a clear cause, at least 0.6 of the sum, whose margin over the next φ is the median.""",
+    objects_npz="objects/{shown_source}.npz",
+    causes_npz="causes/{shown_source}/seed{first_seed}.npz",
+    predictions_csv="diagnoses/{shown_source}/{cause_explainer}/seed{first_seed}.csv",
+)
+def causes_example(run: Run, objects_npz: Path, causes_npz: Path, predictions_csv: Paths) -> Figure:
+    truth, titles = _truth_of(run), cause_titles(run.config)
+    explainers = {name: titles[name] for name in (*COMPARED, "rule") if name in titles} or titles
     causes = Causes.load(causes_npz)
     row = usual_failure(causes, causes_npz, is_clear(causes))
-    source, seed = Path(causes_npz).parent.name, seed_of_file(causes_npz)
-    objects = ObjectClouds.load(objects_npz)
-    _, observed_8 = replay(objects, causes, row, source, seed, settings)
+    source, objects = run.config["figures"]["source"], ObjectClouds.load(objects_npz)
+    _, observed_8 = replay(objects, causes, row, source, seed_of_file(causes_npz), truth)
     names, scores_R_4, verdicts = _scores(causes, row, predictions_csv, explainers)
     below_in = 0.35 + ROW_IN * max(len(names) + GAP, 5)
-    figure = use_style().figure(figsize=(TEXT_WIDTH_IN, HEAD_IN + SOLID_IN + below_in), layout="constrained")
-    above, below = figure.subfigures(2, 1, height_ratios=(SOLID_IN + HEAD_IN / 2, below_in + HEAD_IN / 2))
+    drawing = use_style().figure(figsize=(TEXT_WIDTH_IN, HEAD_IN + SOLID_IN + below_in), layout="constrained")
+    above, below = drawing.subfigures(2, 1, height_ratios=(SOLID_IN + HEAD_IN / 2, below_in + HEAD_IN / 2))
     error_8 = causes.truth.error[row]
     most = int(np.argmax(causes.truth.phi[row]))
     kept = SUBSETS.index(tuple(cause for cause in range(len(CONCEPTS)) if cause != most))
@@ -66,33 +70,47 @@ def draw_causes_example(
     left, right = below.subfigures(1, 2, width_ratios=(0.42, 0.58))
     _draw_waterfall(left.subplots(), error_8[SUBSETS.index(())], causes.truth.phi[row])
     _draw_scores(right.subplots(), names, scores_R_4, verdicts)
-    shown_error = f"{100 * causes.error_shown[row]:.1f} %"
-    object_name = object_in_words(causes.registrations.object_name[row], dataset)
-    write_title(figure, f"{title}: {object_name}. The registration shown to the explainers is off by {shown_error}")
-    return figure
+    error = f"{100 * causes.error_shown[row]:.1f} %"
+    write_title(drawing, f"{_shown(run, causes, row)}. The registration shown to the explainers is off by {error}")
+    return drawing
+
+
+def _truth_of(run: Run) -> CauseSettings:
+    return CauseSettings.from_dict(dict(run.config["causes"]), dict(run.config["registrations"]["icp"]))
+
+
+def _shown(run: Run, causes: Causes, row: int) -> str:
+    source, name = run.config["figures"]["source"], causes.registrations.object_name[row]
+    return f"{run.source_titles[source]}: {object_in_words(name, run.datasets[source])}"
 
 
 GALLERY_IN, LETTERS = 1.8, 44  # height of a row of failures with what explainers say, and letters of a line there
+IN_BRIEF = {"reenact": "re-enactment", "gpca": "GP-CA", "rule": "rule"}  # explainers of the gallery
 
 
-def draw_failures(
-    objects_npz: Mapping[str, Path],
-    causes_npz: Mapping[str, Path],
-    predictions_csv: Paths,
-    explainers: Mapping[str, str],
-) -> Figure:
-    """Draw a failed test registration of each source (rows) and dominant cause (columns), with what explainers name.
-
-    Shown is the failure whose error is the median of its kind. Files are given by title of their source.
-    """
+@figure(
+    SECTION,
+    "Failures, and what explainers name",
+    """A failed test registration of each dataset and each dominant cause, as ICP left it, with its error relative to
+    the diameter: of its kind, the one whose error is the median. Below stands who names the dominant cause, who one
+    that adds nearly as much (tie), and who another, which follows in brackets.""",
+    objects_files="objects/{source}.npz",
+    causes_files="causes/{source}/seed{first_seed}.npz",
+    predictions_csv="diagnoses/{source}/{cause_explainer}/seed{first_seed}.csv",
+)
+def failures(run: Run, objects_files: Paths, causes_files: Paths, predictions_csv: Paths) -> Figure:
+    titles = cause_titles(run.config)
+    explainers = {name: words for name, words in IN_BRIEF.items() if name in titles} or dict(list(titles.items())[:3])
+    objects_npz = {Path(path).stem: path for path in objects_files}
+    causes_npz = {Path(path).parent.name: path for path in causes_files}
     size = (TEXT_WIDTH_IN, HEAD_IN + GALLERY_IN * len(causes_npz))
-    figure = use_style().figure(figsize=size, layout="constrained")
-    parts = figure.subfigures(len(causes_npz), 1, squeeze=False)[:, 0]
-    for title, part in zip(causes_npz, parts, strict=True):
-        part.supylabel(title)
+    drawing = use_style().figure(figsize=size, layout="constrained")
+    parts = drawing.subfigures(len(causes_npz), 1, squeeze=False)[:, 0]
+    for source, part in zip(causes_npz, parts, strict=True):
+        part.supylabel(run.source_titles[source])
         panels = part.subplots(1, len(CONCEPTS))
-        causes, objects = Causes.load(causes_npz[title]), ObjectClouds.load(objects_npz[title])
-        files = [path for path in predictions_csv if Path(path).parents[1].name == causes_npz[title].parent.name]
+        causes, objects = Causes.load(causes_npz[source]), ObjectClouds.load(objects_npz[source])
+        files = [path for path in predictions_csv if Path(path).parents[1].name == source]
         failed_S = (causes.registrations.split == "test") & (causes.truth.state == FAILED)
         for concept, panel in zip(CONCEPTS, panels, strict=True):
             rows = np.flatnonzero(failed_S & (causes.truth.dominant == concept))
@@ -110,8 +128,8 @@ def draw_failures(
             words += [fill(f"{verdict}: {', '.join(who)}", LETTERS) for verdict, who in answers.items() if who]
             clouds = {"\n".join(words): causes.registrations.cloud(row)}
             _draw_over_solid(np.array([panel]), objects, causes, row, clouds, size=2.0)
-    write_title(figure, "Failed registrations, and what explainers name")
-    return figure
+    write_title(drawing, "Failed registrations, and what explainers name")
+    return drawing
 
 
 def _draw_over_solid(
@@ -221,31 +239,29 @@ LEAST_AREA, MOST_AREA = 6.0, 34.0  # points², of the marks of an improbable and
 AGREE = 1e-6  # diameters; numbers of a file and of the same re-enactment made again
 
 
-def draw_reenactment(
-    objects_npz: str | Path,
-    causes_npz: str | Path,
-    reenactments_npz: str | Path,
-    truth: CauseSettings,
-    settings: ReenactmentSettings,
-    title: str,
-    dataset: str = "",
-) -> Figure:
-    """Draw in one strip the result of ICP, the likeliest pose and the clouds that are rebuilt there; and below it the
-    errors of all eight registrations, measured and re-enacted, with the verdict.
-
-    The sample is a usual case in doubt: a failure of several causes that has more than one hypothesis. The paths name
-    the shown source and seed.
-    """
+@figure(
+    SECTION,
+    "One failed registration, re-enacted by an observer",
+    """Above, what ICP made of the observed cloud, where the likeliest hypothesis of the true pose puts it in the model,
+    with its probability, and the clouds that are rebuilt there. Below, the mean error of registrations with each
+    subset of the causes: measured, with the truth (bars), and re-enacted under each hypothesis (marks, the larger the
+    more probable). Shown is the failed test sample of median margin with several causes and several hypotheses.""",
+    objects_npz="objects/{shown_source}.npz",
+    causes_npz="causes/{shown_source}/seed{first_seed}.npz",
+    reenactments_npz="reenactments/{shown_source}/seed{first_seed}.npz",
+)
+def reenactment(run: Run, objects_npz: Path, causes_npz: Path, reenactments_npz: Path) -> Figure:
     from gpca.causes.descriptors import observed_pair
     from gpca.reenactment.dataset import Reenactments
     from gpca.reenactment.enactment import reenact
 
-    source, seed = Path(causes_npz).parent.name, seed_of_file(causes_npz)
+    settings = read_settings(ReenactmentSettings, dict(run.config["diagnosis"]["reenactment"]))
+    source, seed = run.config["figures"]["source"], seed_of_file(causes_npz)
     causes = Causes.load(causes_npz, (source, seed))
     enacted = Reenactments.load(reenactments_npz, causes.registrations)
     row = usual_failure(causes, causes_npz, enacted.weight[:, 1] > 0)
     pair = observed_pair(causes, row, source, seed, "reenactment")
-    again = reenact(pair, settings, truth)
+    again = reenact(pair, settings, _truth_of(run))
     weight_K = enacted.weight[row][: len(again)]
     errors_K_8 = np.array([enactment.error_8 for enactment in again])
     if np.abs(errors_K_8 - enacted.error[row][: len(again)]).max() > AGREE:
@@ -261,15 +277,15 @@ def draw_reenactment(
         "there, completed": rebuilt.observed(tuple(cause for cause in applied if cause != OVERLAP)),
     }
     strip_in = HEAD_IN + SOLIDS_IN + CAPTION_IN
-    figure = use_style().figure(figsize=(TEXT_WIDTH_IN, strip_in + ERRORS_IN), layout="constrained")
-    above, below = figure.subfigures(2, 1, height_ratios=(strip_in, ERRORS_IN))
+    drawing = use_style().figure(figsize=(TEXT_WIDTH_IN, strip_in + ERRORS_IN), layout="constrained")
+    above, below = drawing.subfigures(2, 1, height_ratios=(strip_in, ERRORS_IN))
     _draw_over_solid(above.subplots(1, len(clouds)), ObjectClouds.load(objects_npz), causes, row, clouds, size=1.5)
     _draw_errors(below.subplots(), causes.truth.error[row], errors_K_8, weight_K)
     phi_3 = shapley_values((weight_K[:, None] * errors_K_8).sum(axis=0)[None])[0]
     named, true = CONCEPTS[int(np.argmax(phi_3))], causes.truth.dominant[row]
     verdict = f"It names {named}" + (", as measured" if named == true else f"; measured is {true}")
-    write_title(figure, f"{title}: {object_in_words(causes.registrations.object_name[row], dataset)}. {verdict}")
-    return figure
+    write_title(drawing, f"{_shown(run, causes, row)}. {verdict}")
+    return drawing
 
 
 def _draw_errors(panel, true_8: np.ndarray, error_K_8: np.ndarray, weight_K: np.ndarray) -> None:

@@ -3,20 +3,16 @@
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from math import inf
-from pathlib import Path
 from typing import Any
 
 from gpca.causes.judged import CEILING
-from gpca.causes.settings import CauseSettings
 from gpca.declarations import Frame, Run, figure, table
 from gpca.evaluation.intervals import REPEATS
 from gpca.evaluation.measures import POOLED
-from gpca.experiments.cause_figures import draw_causes_example, draw_failures
 from gpca.experiments.confusions import draw_confusions
 from gpca.experiments.diagnosis import cause_costs, cause_titles
 from gpca.experiments.leads import lead
 from gpca.explainers.interface import WORDS
-from gpca.objects.entry import dataset_of
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.sheet import Cell, Column, Row, Sheet, crossed, show, where, with_label
 from gpca.reporting.tables.cells import interval_cell, plain_cell, rows_where
@@ -64,48 +60,6 @@ def counts_and_calls(costs: Mapping[str, Mapping]) -> Callable[[Row, Frame], dic
         return shown if calls is None else shown | {"icp_calls": plain_cell(calls, seeds, int(judged))}
 
     return cells
-
-
-@figure(
-    SECTION,
-    "One failed registration and its counterfactuals",
-    """A failed registration of several causes, registered again with every subset of these: Shapley's value φ of a
-    cause is what it added to the error. Below are the scores of some explainers, which saw only the registration with
-    all causes, and who names the dominant cause (right), one that adds nearly as much (tie) or another (wrong). Shown
-    is the failure with a clear cause, at least 0.6 of the sum, whose margin over the next φ is the median.""",
-    objects_npz="objects/{shown_source}.npz",
-    causes_npz="causes/{shown_source}/seed{first_seed}.npz",
-    predictions_csv="diagnoses/{shown_source}/{cause_explainer}/seed{first_seed}.csv",
-)
-def causes_example(run: Run, objects_npz, causes_npz, predictions_csv):
-    source = run.config["figures"]["source"]
-    truth = CauseSettings.from_dict(dict(run.config["causes"]), dict(run.config["registrations"]["icp"]))
-    shown = run.source_titles[source], dataset_of(run.config["sources"][source])
-    titles = cause_titles(run.config)
-    some = {name: titles[name] for name in (*COMPARED, "rule") if name in titles} or titles
-    return draw_causes_example(objects_npz, causes_npz, predictions_csv, truth, some, *shown)
-
-
-IN_BRIEF = {"reenact": "re-enactment", "gpca": "GP-CA", "rule": "rule"}  # explainers of the gallery
-
-
-@figure(
-    SECTION,
-    "Failures, and what explainers name",
-    """A failed test registration of each dataset and each dominant cause, as ICP left it, with its error relative to
-    the diameter: of its kind, the one whose error is the median. Below stands who names the dominant cause, who one
-    that adds nearly as much (tie), and who another, which follows in brackets.""",
-    after="causes_example",
-    objects_files="objects/{source}.npz",
-    causes_files="causes/{source}/seed{first_seed}.npz",
-    predictions_csv="diagnoses/{source}/{cause_explainer}/seed{first_seed}.csv",
-)
-def failures(run: Run, objects_files, causes_files, predictions_csv):
-    objects = {run.source_titles[Path(path).stem]: Path(path) for path in objects_files}
-    causes = {run.source_titles[Path(path).parent.name]: Path(path) for path in causes_files}
-    titles = cause_titles(run.config)
-    some = {name: words for name, words in IN_BRIEF.items() if name in titles} or dict(list(titles.items())[:3])
-    return draw_failures(objects, causes, list(predictions_csv), some)
 
 
 @table(

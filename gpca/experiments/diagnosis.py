@@ -69,7 +69,7 @@ def cause_costs(config: Mapping[str, Any], names: Iterable[str]) -> dict[str, di
 
 EXPERIMENT = Experiment(
     name=NAME,
-    beside=("cause_tables", "sample_strata"),
+    beside=("cause_figures", "cause_tables", "sample_strata"),
     sections={NAME: Section},
     names=lambda config, sources: {
         "cause_explainer": list(config[NAME]["explainers"]),

@@ -11,8 +11,8 @@ from gpca.experiments.cause_figures import (
     TRUTH,
     _draw_scores,
     _draw_waterfall,
-    draw_causes_example,
-    draw_failures,
+    causes_example,
+    failures,
     is_clear,
     usual_failure,
 )
@@ -20,6 +20,7 @@ from gpca.objects.canonical import write_objects
 from gpca.objects.procedural import surfaces
 from gpca.pairs.perturbation import CONCEPTS
 from tests.conftest import FEW_CAUSES, FOUR
+from tests.experiments.runs import run_with
 from tests.figures import words_of
 from tests.judged import write_run
 
@@ -75,15 +76,23 @@ def test_the_bars_of_a_waterfall_begin_where_others_end_and_add_up(causes):
     plt.close(figure)
 
 
+@pytest.fixture
+def run(monkeypatch):
+    titles = {"right": "Right", "always_pose": "Always pose"}
+    monkeypatch.setattr("gpca.experiments.cause_figures.cause_titles", lambda config: titles)
+    source = {"four": {"title": "Four", "kind": "procedural", "stand_in": False}}
+    return run_with(sources=source, figures={"source": "four"}, causes=FEW_CAUSES)
+
+
 def objects_in(folder):
     objects = folder / "four.npz"
     write_objects((surface for surface in surfaces("ycb") if surface.name in FOUR), "four", objects, n_points=6000)
     return objects
 
 
-def test_a_failure_of_each_cause_is_shown_with_who_names_it(causes, tmp_path):
+def test_a_failure_of_each_cause_is_shown_with_who_names_it(causes, run, tmp_path):
     predictions, [truth] = write_run(tmp_path, causes)
-    figure = draw_failures({"Four": objects_in(tmp_path)}, {"Four": truth}, predictions, {"right": "all-knowing"})
+    figure = failures(run, [objects_in(tmp_path)], [truth], predictions)
     failed = (causes.registrations.split == "test") & (causes.truth.state == FAILED)
     words = {text for text in words_of(figure) if " off" in text or "no failure" in text}
     assert len(words) == len(CONCEPTS)
@@ -91,13 +100,12 @@ def test_a_failure_of_each_cause_is_shown_with_who_names_it(causes, tmp_path):
         errors = np.sort(causes.error_shown[failed & (causes.truth.dominant == concept)])
         shown = f"{concept}: {100 * errors[len(errors) // 2]:.0f} % off" if len(errors) else f"no failure by {concept}"
         [caption] = [each for each in words if each.startswith(shown)]
-        assert not len(errors) or "right: all-knowing" in caption
+        assert not len(errors) or "right: Right" in caption
 
 
-def test_the_example_names_its_dataset_and_who_is_right(causes, tmp_path):
+def test_the_example_names_its_dataset_and_who_is_right(causes, run, tmp_path):
     predictions, [truth] = write_run(tmp_path, causes)
-    settings = CauseSettings(**FEW_CAUSES)
-    figure = draw_causes_example(objects_in(tmp_path), truth, predictions, settings, {"right": "Right"}, "Four")
+    figure = causes_example(run, objects_in(tmp_path), truth, predictions)
     words, row = words_of(figure), usual_failure(causes, truth, is_clear(causes))
     assert words[0].startswith(f"Four: {causes.registrations.object_name[row].partition('_')[2].replace('_', ' ')}.")
     phi_3 = np.maximum(causes.truth.phi[row], 0)

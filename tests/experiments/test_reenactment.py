@@ -8,13 +8,14 @@ import pytest
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import FAILED, shapley_values
 from gpca.errors import InputError
-from gpca.experiments.cause_figures import draw_reenactment, usual_failure
+from gpca.experiments.cause_figures import reenactment, usual_failure
 from gpca.objects.canonical import write_objects
 from gpca.objects.procedural import surfaces
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reenactment.dataset import Reenactments, reenact_all
 from gpca.reenactment.settings import ReenactmentSettings
 from tests.conftest import FEW_CAUSES, FOUR
+from tests.experiments.runs import run_with
 from tests.figures import assert_words_are_large_enough_and_inside, words_of
 
 TRUTH, SETTINGS = CauseSettings(**FEW_CAUSES), ReenactmentSettings(hypotheses=3)
@@ -36,7 +37,10 @@ def shown_files(causes, enacted, tmp_path_factory):
 
 
 def draw(paths):
-    return draw_reenactment(*paths, TRUTH, SETTINGS, "Four (procedural stand-in)")
+    diagnosis = {"reenactment": {"hypotheses": SETTINGS.hypotheses}}
+    sources = {"four": {"title": "Four", "kind": "procedural"}}
+    run = run_with(sources=sources, figures={"source": "four"}, causes=FEW_CAUSES, diagnosis=diagnosis)
+    return reenactment(run, *paths)
 
 
 def test_the_sample_failed_by_several_causes_and_has_several_hypotheses_where_one_has(causes, enacted):
