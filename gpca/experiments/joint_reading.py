@@ -15,8 +15,7 @@ from gpca.errors import InputError
 from gpca.evaluation.measures import read_all_metrics, read_metrics, tidy
 from gpca.experiments import reading_words
 from gpca.experiments.active_learning import learning_settings
-from gpca.experiments.reading_steps import retrained_on
-from gpca.experiments.specification_curve import plain_cells, plain_column, stand_ins
+from gpca.experiments.specification_curve import plain_cells, plain_column, retrained_on, stand_ins
 from gpca.explainers.registry import explainer_module
 from gpca.io.csv_file import ANY, read_csv
 from gpca.objects.entry import Name, SourceEntry, title_of

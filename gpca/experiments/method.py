@@ -35,13 +35,10 @@ THRESHOLD: dict[str, Any] = {"color": style.BLACK, "linestyle": (0, (3, 2)), "li
     "III Gaussian process concept attribution",
     "Figure 2: overview",
     """After Figure 2 of the paper: ICP refines the pose, the encoder turns the aligned cloud into an embedding, the
-    Gaussian process classifier gives every concept a score and a variance, and active learning asks for labels
-    where it is uncertain. The error, the resulting state, and the uncertainty u by Monte-Carlo ICP are printed
-    below the aligned clouds, beside the value of u below which 95 % of the unperturbed pairs lie.
-
-    Nothing is done where u is below that value; a person is asked where BALD is above its threshold or no score reaches
-    theirs (dashed); else the dominant concept is acted on. The sample shown has the median score among the test samples
-    with a pose error that failed, are more uncertain than that, and are named correctly.""",
+    Gaussian process classifier gives every concept a score and a variance. Nothing is done where the uncertainty u is
+    that of a clean pair, below which 95 % of them lie; a person is asked where BALD is above its threshold or no score
+    reaches theirs (dashed); else the dominant concept is acted on. The sample shown has the median score among the
+    uncertain and failed test samples with a pose error that are named correctly.""",
     paper=True,
     **FILES,
 )

@@ -31,9 +31,8 @@ THUMBNAILS = 6  # number of clouds of the pool that are drawn
     "III Gaussian process concept attribution",
     "Figure 4: pipeline",
     """After Figure 4 of the paper: what happens to one registration (online inference), and how a batch of labels is
-    chosen and learned (active learning). The sample above and its words are chosen as in Figure 2: one that lacks
-    overlap if such a registration failed, otherwise one with a pose error. Below is the first round of the run in which
-    overlap is new; its pool is the training samples without a label.""",
+    chosen and learned (active learning). The sample above is chosen as in Figure 2. Below is the first round of the run
+    in which a concept is new; its pool is the training samples without a label.""",
     paper=True,
     only={"pool_strategy": tuple(TITLES)},
     **drawing.FILES,

@@ -17,7 +17,7 @@ from gpca.evaluation import measures as evaluated
 from gpca.evaluation.intervals import Clustered, weighted_mean
 from gpca.evaluation.measures import ALL, SHARE, Measure
 from gpca.io.csv_file import numbers as number_column
-from gpca.io.csv_file import read_csv
+from gpca.io.csv_file import read_csv, read_numbers
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.sheet import Row, Sheet, show
@@ -197,12 +197,8 @@ def with_leads(intervals: Frame, rows: Frame, success: Measure) -> Frame:
 
 def read_seconds(files: Paths) -> Frame:
     """Mean seconds by seed, apart from the other measures, because they differ from run to run."""
-
-    def read(path: Path) -> Frame:
-        rows = read_csv(path, ("sample", "start", "seconds"))
-        return rows.assign(seconds=number_column(path, rows, "seconds", least=0))
-
-    rows = evaluated.read_samples(files, read)
+    columns = ("sample", "start", "seconds")
+    rows = evaluated.read_samples(files, lambda path: read_numbers(path, columns, ("seconds",)))
     named = [row_name(row.method.removeprefix("method_"), row.start) for row in rows.itertuples()]
     seconds = {"seconds": Measure("seconds", (0, inf))}
     rows = rows.assign(table=NAME, method=named)
@@ -239,9 +235,8 @@ COSTS = {
     SECTION,
     "Table XI: registration methods",
     """How often each method registers the same pairs correctly, how far it is off and how long it takes. Compare only
-    rows of one start: the pair's own initial pose is the true one for noise and overlap, so a local method can only
-    lose it, while a global method has to find it. CSV also has successes by severity and by the error that is
-    allowed. The paper uses ICP alone.""",
+    rows of one start: from the pair's own, a local method can only lose the true pose of noise and overlap, while a
+    global method has to find it.""",
     **INTERVALS,
     metrics="registration_methods.csv",
     seconds=(read_seconds, "timings/{source}/method_{method}/seed{seed}.csv"),

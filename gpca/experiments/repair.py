@@ -11,16 +11,15 @@ import numpy as np
 from gpca.alignment.methods.registry import installed, method_entry, method_module
 from gpca.declarations import Experiment, Frame, Paths, Plan, Run, Step, Wildcards, numbers, table
 from gpca.evaluation.intervals import Clustered, weighted_mean
-from gpca.evaluation.measures import ALL, SHARE, Measure, Rivals, compared, intervals, per_seed
+from gpca.evaluation.measures import ALL, SHARE, Measure, Rivals, compared, intervals, per_seed, read_samples
 from gpca.experiments.registration_methods import missing_methods
 from gpca.experiments.scan_causes import reenactment_settings
 from gpca.frames.source import REAL_WORLD
 from gpca.guarantee.acceptance import accepted_in_hindsight
-from gpca.io.csv_file import ANY, read_csv
+from gpca.io.csv_file import ANY, read_csv, read_numbers
 from gpca.io.csv_file import numbers as number_column
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.sheet import Row, Sheet, crossed, show
-from gpca.seeds import seed_of_file
 from gpca.settings import Distinct
 from gpca.steps.repair import LIKELIEST, MANY_STARTS, REPAIR, STARTS, Asked
 from gpca.steps.repair_verdicts import CAUSES, COLUMNS, HARD, JUDGED, NAMED, SCORE
@@ -231,13 +230,8 @@ def measured(verdicts: Frame) -> Frame:
 
 def read_seconds(files: Paths) -> Frame:
     """Mean seconds of each method by seed, over all sources of objects; they differ from run to run."""
-    import pandas as pd
-
-    frames = []
-    for path in files:
-        rows = read_csv(path, ("sample", "method", "seconds"))
-        frames.append(rows.assign(seconds=number_column(path, rows, "seconds", least=0), seed=seed_of_file(path)))
-    return mean_seconds(pd.concat(frames, ignore_index=True))
+    columns = ("sample", "method", "seconds")
+    return mean_seconds(read_samples(files, lambda path: read_numbers(path, columns, ("seconds",)), ("source",)))
 
 
 def mean_seconds(rows: Frame) -> Frame:
