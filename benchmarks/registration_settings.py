@@ -160,7 +160,7 @@ def pairs_of_table(results: Path, pairs: int) -> Iterator[Given]:
         objects = ObjectClouds.load(results / f"objects/{source}.npz", source)
         registrations, judges = Registrations.load(path, (source, seed)), Judges(objects, source)
         for row in spread(registrations, pairs, seed):
-            family = objects.family(int(registrations.object_index[row]))
+            family = str(objects.families[registrations.object_index[row]])
             judge, T_true = judges.of(registrations, row), registrations.T_target_source("true", row)
             yield (
                 *(seed, family, np.array(CONCEPTS) == registrations.concept[row]),

@@ -123,6 +123,13 @@ def fields_of(section: Mapping[str, Any], *kinds: type) -> dict[str, Any]:
     return {name: value for name, value in section.items() if name in names}
 
 
+def require_ascending(subject: str, settings: object, *names: str) -> None:
+    for name in names:
+        low, high = getattr(settings, name)
+        if low > high:
+            raise InputError(f"{subject}{name}", f"[{low}, {high}] is in descending order", "swap the two")
+
+
 @dataclass(frozen=True)
 class ArgumentsOf:
     """Marks a function's ``**arguments`` as those of another function or class."""

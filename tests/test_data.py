@@ -92,7 +92,7 @@ def test_every_source_is_read_with_its_families(name, count, smallest_m, largest
     places = read_object_splits(OBJECTS, name)
     assert len(clouds) == count
     assert smallest_m < clouds.diameters_m.min() <= clouds.diameters_m.max() < largest_m
-    assert [(clouds.family(i), clouds.fold(i)) for i in range(count)] == [
+    assert [(clouds.families[i], clouds.folds[i]) for i in range(count)] == [
         (places[object_name].cluster, places[object_name].fold) for object_name in clouds.names
     ]
     assert set(clouds.names) == {object_name for object_name, place in places.items() if place.role != "unused"}

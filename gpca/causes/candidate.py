@@ -1,9 +1,7 @@
 """Candidates, a model and an observed cloud with any subset of the causes, and their counterfactual registrations.
 
 A cause that is not there is small, not zero, or any trace of it would give away that it was applied. Lengths are in
-diameters. The observed cloud is kept in the model's frame, in which the true pose is the identity; a pose error is
-where the registration starts. ICP aligns the model to the observed cloud, so that missing surface hurts, or the
-reverse.
+diameters. The observed cloud is kept in the model's frame, in which the true pose is the identity.
 """
 
 from collections.abc import Callable
@@ -39,7 +37,6 @@ class MovingICP(Protocol):
 
 
 def draw_applied(settings: CauseSettings, random: np.random.Generator) -> np.ndarray:
-    """Return which of the causes (3,) are applied."""
     return random.random(len(CONCEPTS)) < settings.present
 
 
@@ -97,10 +94,9 @@ def draw_candidate(
 ) -> Candidate:
     """Draw the points, of the object's (N, 3), and the severities of a candidate.
 
-    What is small where a cause is not applied is the same perturbation with a smaller severity: along the same axes,
-    away from the same side. The number of points is that of what remains, so that it tells nothing about the surface
-    that is missing. Where the settings have partial models, overlap may be that the model lacks surface, with or
-    without that some is hidden in what was observed.
+    What is small is the same perturbation with a smaller severity, along the same axes. The number of points is that of
+    what remains, so that it tells nothing about missing surface. With partial models, overlap may be that the model
+    lacks surface, with or without that some is hidden in what was observed.
     """
     fewest, most = settings.points
     form = DrawnForm.drawn(settings.form, random.spawn(1)[0])

@@ -1,8 +1,7 @@
 """Descriptors of registered pairs in groups, the file that holds them, and what has to be seen for each.
 
-The group `remedied` has counterfactuals that anyone can make of their own registration: the observed cloud is denoised,
-ICP starts from farther off and the best result counts, or the observed cloud is aligned to the model, in which it finds
-partners everywhere. The result with all remedies stands for the unknown truth.
+The group `remedied` has counterfactuals that anyone can make: the observed cloud is denoised, ICP starts from farther
+off, or roles are swapped. The result with all remedies stands for the unknown truth.
 """
 
 from collections.abc import Collection, Mapping
@@ -29,12 +28,8 @@ from gpca.uncertainty.interventions import denoise
 
 
 def describe_remedied(pair: ObservedPair, settings: DescriptorSettings, icp: ICPSettings) -> np.ndarray:
-    """Return the numbers of :data:`gpca.causes.settings.REMEDIED`.
-
-    For each subset of the causes that are left alone: v̂ in diameters; after the Shapley values of v̂, how far the best
-    result moves the observed cloud from where it lies, and the best result's cost (squared diameters) and fitness.
-    Last, the share of the points that denoising takes for outliers, and how far it smooths.
-    """
+    """Return `REMEDIED`: v̂ by subset of the causes left alone and its Shapley values; how far the best result moves the
+    observed cloud, its cost (squared diameters) and fitness; the share of outliers, and how far denoising smooths."""
     observed = pair.observed[generator(*pair.axes, "remedies").permutation(len(pair.observed))]
     cleaned, model = denoise(observed), pair.model[: settings.icp_points]
     random = generator(*pair.axes, "restarts")

@@ -26,14 +26,6 @@ TIED = " tied"  # after the cause of a candidate in which another adds as much t
 GIVEN_AWAY = " given away"  # after the cause of a candidate that was refused for its trivial numbers
 COLUMNS = ("split", "object", "group", "several", "kept", "refused")
 UNSEEN: Group = ("any", False)  # of a candidate that was not registered
-REMEDIES = {
-    NOMINAL: "lower causes.severities, raise causes.limits.nominal",
-    BORDERLINE: "raise success.error",
-    "noise": "raise causes.severities.noise or causes.severities.outliers, lower causes.points",
-    "pose": "raise causes.severities.rotation_deg or causes.severities.translation",
-    "overlap": "raise causes.severities.crop",
-    GEOMETRY: "lower causes.points",
-}
 
 
 def apportion(total: int, shares: dict[str, float]) -> dict[str, int]:
@@ -83,15 +75,13 @@ class Quotas:
         unfilled = [name for name, wanted in self._wanted.items() if self._count(name) < wanted]
         # The least filled one; of several that are empty, the largest.
         name = min(unfilled, key=lambda name: (self._count(name) / self._wanted[name], -self._wanted[name]))
-        change, state = "", "samples misaligned when clean" if name == GEOMETRY else f"{name} samples"
+        state = "samples misaligned when clean" if name == GEOMETRY else f"{name} samples"
         if name in CONCEPTS:
-            state = f"samples that failed from {name}"
             lacking = [several for several in (False, True) if self.wants((name, several))]
-            if len(lacking) == 1:
-                state += " among several causes" if lacking[0] else " alone"
-                change = ", widen causes.several"
+            kind = "" if len(lacking) == 2 else " among several causes" if lacking[0] else " alone"
+            state = f"samples that failed from {name}{kind}"
         fault = f"{candidates} candidates yielded {self._count(name)} of {self._wanted[name]} {state}"
-        remedy = f"{REMEDIES[name]}{change}, or move part of causes.shares.{name} to another share"
+        remedy = f"change causes.severities, limits, points or several, or lower causes.shares.{name}"
         return InputError(f"causes of {source}, seed {seed}, {split}", fault, remedy)
 
     def _count(self, name: str) -> int:
@@ -104,18 +94,13 @@ def state_of(truth: Truth) -> str:
 
 
 def group_of(truth: Truth) -> Group:
-    """Return the group of the one sample of a truth."""
     if (state := state_of(truth)) != FAILED:
         return state, False
     return str(truth.dominant[0]), bool(truth.causes[0].sum() > 1)
 
 
 class Tally(Counter[tuple[str, str, str, bool, bool]]):
-    """Numbers of candidates by split, object, group, and whether they were kept.
-
-    Groups are those of `Quotas`, and why a candidate has no truth. It is refused as soon as that is known, before any
-    registration (``any``) or when the state is (``failed``).
-    """
+    """Numbers of candidates by split, object, group (or why there is no truth), several causes, and if kept."""
 
     def save(self, path: str | Path) -> None:
         """Write the CSV described in results/README.md."""
@@ -130,14 +115,9 @@ ENDS = (NONE,) * ALL + (ALL,)  # they tell the state, and so whether the others 
 def draw_causes(
     objects: ObjectClouds, source: str, seed: int, settings: CauseSettings
 ) -> tuple[Causes, Tally, np.ndarray]:
-    """Draw candidates, measure their causes and keep those that are wanted.
+    """Draw candidates and keep those that are wanted; return them, the tally, and the seconds (S,) of ICP.
 
-    The random numbers of a candidate come from generators named by source, seed, split and its number. Which candidates
-    are kept depends on how many samples are wanted. Raises InputError for too few objects, no clean pair that can be
-    registered, or a group that cannot be filled.
-
-    Returns:
-        the registrations; how many candidates were kept and refused; the seconds (S,) that ICP took for each.
+    Source, seed, split and number name a candidate's random numbers. InputError for a group that cannot be filled.
     """
     drawing = _Drawing(objects, source, seed, settings)
     records = [record for split in SPLITS for record in drawing.of_split(split)]
@@ -148,10 +128,7 @@ def draw_causes(
 def draw_further(
     objects: ObjectClouds, source: str, seed: int, settings: CauseSettings, chunk: int, wanted: int
 ) -> Causes:
-    """Draw training samples of all objects, in the states of :func:`draw_causes` but borderline.
-
-    The chunk names the draws: two have no candidate in common, and neither depends on the other.
-    """
+    """Draw training samples of all objects but borderline ones; two chunks have no candidate in common."""
     further = replace(_labeled_alone(settings), train=wanted)
     drawing = _Drawing(objects, source, seed, settings, further, ("further", chunk), every=True)
     return as_causes(drawing.of_split("train"), (source, seed))[0]
@@ -171,16 +148,12 @@ def draw_shifted(
 
 
 def _labeled_alone(settings: CauseSettings) -> CauseSettings:
-    """Return the settings with the same shares of all samples but borderline ones."""
     shares = asdict(settings.shares) | {BORDERLINE: 0.0, GEOMETRY: 0.0}
     return replace(settings, shares=Shares(**{name: share / sum(shares.values()) for name, share in shares.items()}))
 
 
 class _Drawing:
-    """Draws by settings of its own; `part` names the draws too.
-
-    Of each split it shows the objects of :func:`draw_causes`, or every object.
-    """
+    """Draws by settings of its own, for each split the objects of :func:`draw_causes`, or every object."""
 
     def __init__(
         self,

@@ -1,9 +1,8 @@
 """Registrations of depth frames whose causes are measured: nothing about them was simulated.
 
-Mesh, pose and camera of an instance are known, so each of the three can be taken away: noise, by where the rays of the
-same pixels meet the mesh at the true pose; missing surface, by the whole side that the camera would see, with residuals
-like those measured where noise is; a pose error, by a start from the true pose. The model is what the camera would see
-at the pose that ICP starts from: the side that an object hides by itself counts as no cause.
+Noise is taken away by where the rays of the same pixels meet the mesh at the true pose; missing surface, by the whole
+side that the camera would see; a pose error, by a start from the true pose. The model is what the camera would see at
+the pose that ICP starts from: the side that an object hides by itself counts as no cause.
 """
 
 from collections.abc import Mapping

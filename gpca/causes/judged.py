@@ -1,7 +1,6 @@
 """Test samples with their truth and an explainer's predictions, and the measures of a diagnosis.
 
-Measures take weights (B, N) of the samples, ones or how often a bootstrap drew each, and return B values, NaN where
-there is no sample. Borderline samples are not counted.
+Measures take weights (B, N) of the samples, and return B values, NaN where none counts.
 """
 
 from __future__ import annotations
@@ -97,7 +96,6 @@ def read_judged(
 
 
 def joined(parts: Iterable[Judged]) -> Judged:
-    """Return the samples of several one after the other."""
     parts = list(parts)
     return Judged(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Judged)))
 
@@ -128,9 +126,7 @@ def judged_of(
     named_N: np.ndarray,
     alarm_N: np.ndarray | None = None,
 ) -> Judged:
-    """Return test samples with scores of the labels and the label named, empty for none; alarms are 1 − nominal if
-    None.
-    """
+    """Return test samples with scores of labels and the label named, empty for none; alarms are 1 − nominal if None."""
     truth, shown_N = tested.truth, tested.error_shown
     return Judged(
         label=labels_of(truth),

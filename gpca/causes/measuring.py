@@ -52,7 +52,7 @@ class Subject:
         diameter_m = float(objects.diameters_m[index])
         surface = objects.points(index).astype(np.float64) / diameter_m
         errors = PoseErrors(surface, JUDGED_POINTS, symmetric)
-        name, family, fold = str(objects.names[index]), objects.family(index), objects.fold(index)
+        name, family, fold = str(objects.names[index]), str(objects.families[index]), int(objects.folds[index])
         return cls(index, name, diameter_m, surface, symmetric, errors, family, fold)
 
 
@@ -82,8 +82,7 @@ def measure_clean_pairs(
 ) -> tuple[list[Subject], float]:
     """Measure clean pairs, of which no cause is more than small.
 
-    An object of which nearly all clean pairs are off is left out, unless the settings ask for samples of that kind;
-    none left raises InputError. The limit of the uncertainty, returned after the subjects that are left, is a quantile
+    Return the subjects, without those of which nearly all pairs are off, and the limit of the uncertainty: a quantile
     of the divergence between two clean pairs of one object, with equal numbers of points, from the same starts.
     """
     off = f"an error of at least {100 * settings.limits.nominal:g} % of the diameter or cannot be registered"

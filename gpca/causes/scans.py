@@ -1,9 +1,8 @@
 """Registrations of scans to scans whose causes are measured: real sensors, real overlap.
 
-Given the true pose, the pose error can be taken away, and so can what only one of the scans sees. Measured noise
-cannot, so as a cause it is an addition, in multiples of the sensor's; a *natural* registration has none. The source
-moves onto the target. Errors are root mean square distances over the surface that both truly have in common, scaled so
-that the limit of success is that of all other experiments.
+The pose error can be taken away, and so can what only one scan sees. Measured noise cannot, so as a cause it is an
+addition, in multiples of the sensor's. Errors are root mean square distances over the surface that both truly have in
+common, scaled so that the limit of success is that of all other experiments (docs/appendix.md).
 """
 
 from __future__ import annotations
@@ -69,18 +68,14 @@ class OverlapErrors:
 
 @dataclass(frozen=True)
 class DrawnScans:
-    """Some points of both scans of a pair, where they truly lie, in the target's frame about its middle.
-
-    Lengths are relative to :attr:`unit_m`. An error is the distance (RMSE over the common points) times the factor, so
-    that the limit of success is the same number for all pairs, and for whole objects.
-    """
+    """Some points of both scans, where they truly lie, in the target's frame about its middle, in :attr:`unit_m`."""
 
     pair: ScanPair
     source: np.ndarray  # (N, 3)
     target: np.ndarray  # (P, 3)
     source_common: np.ndarray  # rows of either that lie on surface that the other scan has as well
     target_common: np.ndarray
-    error_factor: float
+    error_factor: float  # of distances, so that the limit of success is that of whole objects
 
     @classmethod
     def of(cls, pair: ScanPair, points: int, limit_m: float, failed: float, random: np.random.Generator) -> DrawnScans:

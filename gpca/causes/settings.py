@@ -1,7 +1,4 @@
-"""Settings of the registrations with measured causes and of their descriptors (docs/causes.md).
-
-Lengths are in diameters, on scans in the usual size of a scan.
-"""
+"""Settings of causes and of descriptors (docs/causes.md); lengths are in diameters, or the usual size of a scan."""
 
 from __future__ import annotations
 
@@ -13,7 +10,7 @@ import numpy as np
 from gpca.causes.truth import SUBSETS
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS, HalfTurn, Hidden, Severities, Shift
-from gpca.settings import Bounds, Count, OpenShare, Positive, PositiveShare, Share, read_settings
+from gpca.settings import Bounds, Count, OpenShare, Positive, PositiveShare, Share, read_settings, require_ascending
 from gpca.uncertainty.settings import FEWEST_STARTS, UncertaintySettings, start_deviation
 
 GROUPS = ("distances", "planes", "motion", "starts", "remedied", "entropy")
@@ -147,10 +144,7 @@ class CauseSettings(UncertaintySettings):
     candidates: Calls = 20  # drawn for each sample that is wanted, at most
 
     def __post_init__(self) -> None:
-        for name in ("points", "several", "lacking"):
-            low, high = getattr(self, name)
-            if low > high:
-                raise InputError(f"causes {name}", f"[{low}, {high}] is in descending order", "swap the two")
+        require_ascending("causes ", self, "points", "several", "lacking")
 
     def runs(self) -> UncertaintySettings:
         """Return the part that says how ICP runs from other starts."""

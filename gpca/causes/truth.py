@@ -1,7 +1,4 @@
-"""The truth about S registrations: errors and uncertainties under every subset of the causes, states, Shapley values.
-
-Subset b of the eight has cause i of noise, pose and overlap where bit i of b is set.
-"""
+"""The truth about S registrations under every subset of the causes: subset b has cause i where bit i of b is set."""
 
 from __future__ import annotations
 

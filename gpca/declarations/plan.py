@@ -71,9 +71,9 @@ class Run:
         """Name -> title, given the function that returns the entry of a name, such as ``method_entry``."""
         return {name: entry(name).title for name in names}
 
-    def stand_ins(self, names: Iterable[str] | None = None, partly: bool = True) -> str:
+    def stand_ins(self, names: Iterable[str] | None = None) -> str:
         """Clause of a caption on stand-ins among these sources, or among all."""
-        return stand_in_clause((self.sources[name] for name in (self.sources if names is None else names)), partly)
+        return stand_in_clause(self.sources[name] for name in (self.sources if names is None else names))
 
     def seeds(self, most: int | None = None) -> list[int]:
         """Seeds of the run, or the first of them."""

@@ -181,7 +181,7 @@ def _table(
     cell = label_cells(run.config["registrations"]["test"], clusters)
     sheet = Sheet(name, {head: HEADS[head] for head in heads}, rows, columns, metrics, cell=cell)
     over = f"{cautious_over(sheet.seeds, run.config['registrations']['test'])}."
-    caption += run.stand_ins(partly=False)
+    caption += run.stand_ins()
     return sheet.table(caption, "quantity", (over, *notes), keep_empty=True, **compared)
 
 

@@ -136,8 +136,8 @@ def _draw_over_solid(
     panels: np.ndarray, objects: ObjectClouds, causes: Causes, row: int, clouds: Mapping[str, np.ndarray], size: float
 ) -> None:
     """Draw the model of a sample as a shaded solid and clouds over it, each with its name below, at one scale."""
-    index = objects.names.index(causes.registrations.object_name[row])
-    points, normals = (part.astype(float) for part in objects.clouds[index])
+    index = objects.row(causes.registrations.object_name[row])
+    points, normals = (of(index).astype(float) for of in (objects.points, objects.normals_of))
     points = points / objects.diameters_m[index]
     axes = widest_views(points)[0]
     solid = Solid.of(points, normals, axes, PIXELS, NEUTRAL)

@@ -122,7 +122,7 @@ def table4_kernels(run: Run, intervals):
     columns = {name: show("accuracy", title, where={"source": name}) for name, title in titles(run).items()}
     sheet = Sheet("table4_kernels", HEADS, rows, columns, intervals)
     shown = [name for name in columns if (intervals["source"] == name).any()]
-    caption = "Accuracy of the GPC by kernel and schedule (%)" + run.stand_ins(shown, partly=False)
+    caption = "Accuracy of the GPC by kernel and schedule (%)" + run.stand_ins(shown)
     cell = next(cell for cell in sheet.cells.values() if cell.test_samples)
     note = "The rows that the paper prints; kernels.csv has all combinations, with confidence and calibration."
     return sheet.table(caption, "source", [f"{sheet.over(cell.test_samples // cell.seeds)}.", note], bold=columns)

@@ -123,7 +123,7 @@ def fig3_concepts(run: Run, objects_file: Path, registrations_file: Path) -> Fig
     samples = choose_samples(registrations, registrations_file)
     name = str(registrations.object_name[samples["noise"]])
     sources = {concept: stages_of.source_before_icp(registrations, sample) for concept, sample in samples.items()}
-    row = objects.names.index(name)
+    row = objects.row(name)
     points_shown = max(len(source) for source in sources.values())  # so that both clouds are equally dense
     target = objects.points(row)[:points_shown] / objects.diameters_m[row]
     view = choose_view(target, sources)

@@ -99,7 +99,7 @@ def trials(files: Paths, objects: Paths) -> Frame:
     families = {}
     for path in objects:
         clouds = ObjectClouds.load(path)
-        families[Path(path).stem] = {name: clouds.family(i) for i, name in enumerate(clouds.names)}
+        families[Path(path).stem] = dict(zip(clouds.names.tolist(), clouds.families.tolist(), strict=True))
 
     def read(path: Path) -> Frame:
         rows, (source, method, _) = read_trials(path), evaluated.source_method_seed(path)

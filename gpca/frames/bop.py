@@ -1,7 +1,6 @@
-"""Depth frames in the layout of the BOP benchmark.
+"""Depth frames in the layout of the BOP benchmark, lengths in meters instead of millimeters.
 
-Format: https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_format.md. Lengths are millimeters in the
-files and meters here; cameras look along +z with x to the right and y down.
+Format: https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_format.md.
 """
 
 from collections.abc import Iterable, Iterator
@@ -44,12 +43,10 @@ def read_camera(entry: Any, subject: str) -> tuple[np.ndarray, float]:
     matrix_subject = f"{subject}: cam_K"
     if abs(camera_3_3[[1, 2, 2], [0, 0, 1]]).max() > 1e-6 or abs(camera_3_3[2, 2] - 1) > 1e-6:
         raise InputError(matrix_subject, "is not a camera matrix", "give fx s cx, 0 fy cy, 0 0 1, row by row")
-    focal_px = np.diag(camera_3_3)[:2]
-    if not ((focal_px >= FOCAL_PX[0]) & (focal_px <= FOCAL_PX[1])).all():
+    focal_px, (nearest_px, farthest_px) = np.diag(camera_3_3)[:2], FOCAL_PX
+    if focal_px.min() < nearest_px or abs(camera_3_3[:2]).max() > farthest_px:
         fault = f"has the focal lengths {focal_px[0]:.6g} and {focal_px[1]:.6g} px"
-        raise InputError(matrix_subject, fault, "they must be positive; check fx and fy")
-    if abs(camera_3_3[:2]).max() > FOCAL_PX[1]:
-        raise InputError(matrix_subject, "has a skew or principal point outside any image", "give them in pixels")
+        raise InputError(matrix_subject, f"{fault}, or a principal point outside any image", "give them in pixels")
     (scale,) = _numbers(entry, "depth_scale", 1, subject)
     if not DEPTH_SCALES[0] <= scale <= DEPTH_SCALES[1]:
         raise InputError(subject, f"depth_scale is {scale:.6g}", "give the millimeters per unit of the depth images")
@@ -106,10 +103,8 @@ class Frame:
     def depth_m(self) -> np.ndarray:
         """Return depth (H, W) in meters, 0 where nothing was measured; InputError unless the image has 16-bit depth."""
         depth_H_W = read_image(self.depth, REMEDY)
-        if depth_H_W.ndim != 2:
-            raise InputError(self.depth, "is a color image, not depth", REMEDY)
-        if depth_H_W.dtype.itemsize == 1:
-            raise InputError(self.depth, "is 8-bit depth: 16 bits expected", "export it again without conversion")
+        if depth_H_W.ndim != 2 or depth_H_W.dtype.itemsize == 1:
+            raise InputError(self.depth, "is color or 8-bit, not 16-bit depth", "export it again without conversion")
         if (depth_H_W < 0).any() or np.isinf(depth_H_W).any():  # NaN is a usual mark of what was not measured
             raise InputError(self.depth, "contains negative or infinite depth", "write 0 where nothing was measured")
         if not (depth_H_W > 0).any():

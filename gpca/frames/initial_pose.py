@@ -1,7 +1,6 @@
 """Initial poses of ICP in frames: results of pose estimators, the truth with a declared error, or features.
 
-Results are files of the BOP benchmark (https://github.com/thodan/bop_toolkit, "Evaluating your method"). A pose error
-is ``T_true_estimated`` in the frame of the object's model: what takes the true pose to the estimated one.
+A pose error is ``T_true_estimated`` in the frame of the object's model: what takes the true pose to the estimated one.
 """
 
 from __future__ import annotations
@@ -167,8 +166,7 @@ def displace(T_camera_object: np.ndarray, diameter_m: float, settings: InitialPo
 class GlobalRegistration:
     """FPFH and RANSAC (Rusu et al. 2009; Zhou et al. 2018) through Open3D: a stand-in for an estimator.
 
-    Of several runs refined by point-to-plane ICP, the best has the highest sum of two shares: of measured points on the
-    model, and of the model's points facing the camera that were measured. Many poses explain the points alone.
+    Of several runs, the best has most points on the model plus most points that face the camera and were measured.
     """
 
     def __init__(self, points_m: np.ndarray, normals: np.ndarray, diameter_m: float, settings: InitialPoseSettings):

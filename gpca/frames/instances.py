@@ -138,7 +138,7 @@ def read_instances(
     left_out: list[str] = []
     seen: list[_Seen] = []
     for dataset, frames, models in datasets.values():
-        index = {number: objects.names.index(model.surface.name) for number, model in models.items()}
+        index = {number: objects.row(model.surface.name) for number, model in models.items()}
         trees = {number: cKDTree(objects.points(i)) for number, i in index.items()}
         symmetric = {number: bool(models[number].listed_symmetries) for number in index}
         for number, i in index.items():
@@ -217,7 +217,6 @@ class _Seen(NamedTuple):
 def _poses(
     seen: list[_Seen], objects: ObjectClouds, settings: initial_pose.InitialPoseSettings
 ) -> list[tuple[str, np.ndarray]]:
-    """Return the form of the initial poses, and each of them, without asking an estimator."""
     poses: list[tuple[str, np.ndarray]] = []
     registration: dict[tuple[str, int], initial_pose.GlobalRegistration] = {}
     for of in progress(seen, "initial poses"):
@@ -227,7 +226,7 @@ def _poses(
         else:
             key = row["dataset"], of.annotation.object_id
             if key not in registration:
-                points_m, normals = objects.clouds[row["object_index"]]
+                points_m, normals = objects.points(row["object_index"]), objects.normals_of(row["object_index"])
                 registration[key] = initial_pose.GlobalRegistration(points_m, normals, of.diameter_m, settings)
             T_init = registration[key].register(row["points_m"], seed_of(*axes))
         poses.append((settings.form, T_init))

@@ -20,7 +20,7 @@ from gpca.objects.surface import Surface
 from gpca.process.progress import progress
 from gpca.rigid import inverse, rigid_motion, transform
 from gpca.seeds import generator
-from gpca.settings import Bounds, Count, Distinct
+from gpca.settings import Bounds, Count, Distinct, require_ascending
 
 FLAT = 1e-9  # volume of the convex hull in diameters cubed; that of a sheet of paper is 1e-4
 
@@ -67,19 +67,8 @@ class SceneSettings:
     camera: Camera = field(default_factory=Camera)
     noise: DepthNoise = field(default_factory=DepthNoise)
 
-    @classmethod
-    def from_dict(cls, settings: dict) -> SceneSettings:
-        """Build from the config's section ``real_world.scenes``."""
-        settings = {name: tuple(value) if isinstance(value, list) else value for name, value in settings.items()}
-        camera = Camera(**settings.pop("camera", {}))
-        noise = DepthNoise(**settings.pop("noise", {}))
-        return cls(camera=camera, noise=noise, **settings)
-
     def __post_init__(self) -> None:
-        for name in ("objects", "distance_m", "elevation_deg"):
-            low, high = getattr(self, name)
-            if low > high:
-                raise InputError(f"scenes {name}", f"[{low}, {high}] is in descending order", "swap the two")
+        require_ascending("scenes ", self, "objects", "distance_m", "elevation_deg")
 
 
 @dataclass(frozen=True)
@@ -203,7 +192,6 @@ def _pose(T: np.ndarray, frames: str) -> dict[str, list[float]]:
 
 
 def model_color(model: int, count: int) -> tuple[float, float, float]:
-    """Return the color of one of `count` models, in [0, 1]."""
     from colorsys import hsv_to_rgb
 
     return hsv_to_rgb(model * 0.618034 % 1, 0.55 if model % 2 else 0.75, 0.85)

@@ -154,8 +154,8 @@ def agreement(
 ) -> tuple[float, float, float]:
     """Return how well a pose explains the shots, and how much of the model is hidden, as shares in [0, 1].
 
-    They are the measured points (P, 3) on the model (Q, 3), high for many poses of a partial view; the visible surface
-    that was measured where it should be; and the surface facing the camera that is behind something measured.
+    They are the measured points (P, 3) on the model (Q, 3); the visible surface that was measured where it should be;
+    and the surface facing the camera that is behind something measured.
     """
     placed_m = transform(T_world_object, model_m)
     facing_out = rotate(T_world_object, normals)

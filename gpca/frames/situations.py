@@ -18,7 +18,7 @@ from gpca.objects.surface import Surface
 from gpca.pairs.perturbation import Hidden, Severities, misplace
 from gpca.rigid import inverse, scale_translation, transform
 from gpca.seeds import generator, seed_of
-from gpca.settings import NotNegative
+from gpca.settings import NotNegative, require_ascending
 
 COARSE = 4  # images are thinned by this factor where only shares of pixels count
 LEAST_VISIBLE = 0.7  # share of an object that must be visible before anything is put in front of it
@@ -37,10 +37,7 @@ class SituationSettings:
     severities: Severities = field(default_factory=Severities)  # of the error of the estimated pose, for the cause pose
 
     def __post_init__(self) -> None:
-        for name in ("noise_scale", "hidden"):
-            low, high = getattr(self, name)
-            if low > high:
-                raise InputError(f"recovery.{name}", f"[{low}, {high}] is in descending order", "swap the two")
+        require_ascending("recovery.", self, "noise_scale", "hidden")
 
 
 class Shelf:
@@ -53,8 +50,8 @@ class Shelf:
         self.resting = [stable_poses(surface) for surface in self.surfaces]
         self._hulls_m = [surface.vertices_m[ConvexHull(surface.vertices_m).vertices] for surface in self.surfaces]
         self.objects = sample_objects(self.surfaces, source, points)
-        clouds = zip(self.objects.clouds, self.objects.diameters_m, strict=True)
-        self.symmetric = [bool(find_symmetries(points_m, diameter_m)) for (points_m, _), diameter_m in clouds]
+        sizes = enumerate(self.objects.diameters_m)
+        self.symmetric = [bool(find_symmetries(self.objects.points(i), diameter_m)) for i, diameter_m in sizes]
         self._settings = estimator or InitialPoseSettings()
         self._estimators: dict[int, GlobalRegistration] = {}
 
@@ -67,7 +64,7 @@ class Shelf:
     def estimator(self, model: int) -> GlobalRegistration:
         """Return the pose estimator of an object."""
         if model not in self._estimators:
-            points_m, normals = self.objects.clouds[model]
+            points_m, normals = self.objects.points(model), self.objects.normals_of(model)
             diameter_m = float(self.objects.diameters_m[model])
             self._estimators[model] = GlobalRegistration(points_m, normals, diameter_m, self._settings)
         return self._estimators[model]
@@ -131,7 +128,6 @@ class Situation:
 
 
 def coarse(camera: Camera) -> Camera:
-    """Return the same camera with fewer pixels."""
     return Camera(camera.width // COARSE, camera.height // COARSE, camera.focal_px / COARSE)
 
 

@@ -1,7 +1,5 @@
 """Starts: initial poses of the registrations of instances, by where the poses come from.
 
-Each kind is a condition of its own, since errors of one kind say little about those of another:
-
 - native: found by an estimator in the same image; the pose of every estimator is a start;
 - carried: found in a neighboring image and carried over by its error;
 - transplanted: the truth with an error that an estimator made elsewhere, where none found the instance;
@@ -48,7 +46,7 @@ def all_starts(
 ) -> Starts:
     """Return every start of every instance, by kind; `rungs` are turns in degrees and shifts in diameters."""
     numbers = {
-        (name, objects.names.index(model.surface.name)): number
+        (name, objects.row(model.surface.name)): number
         for name, by_id in models.items()
         for number, model in by_id.items()
     }

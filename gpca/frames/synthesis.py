@@ -39,8 +39,7 @@ def make_frame_registrations(
     """Return aligned pairs of instances, perturbed about their initial poses, the seconds (S,) of ICP, a row for each.
 
     Samples 3t, 3t + 1 and 3t + 2 of a split show one instance under the three concepts in random order; instances take
-    turns, so that objects are as unequally frequent as in the frames. The source frame is the object's at the initial
-    pose, so ICP starts at the identity. Each row has the errors of both poses, ADD-S or ADD relative to the diameter.
+    turns. The source frame is the object's at the initial pose. Errors are ADD-S or ADD relative to the diameter.
     """
     import pandas as pd
 

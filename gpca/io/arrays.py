@@ -3,7 +3,7 @@
 import io
 import math
 import zipfile
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +38,6 @@ def load_arrays(
     shapes: Mapping[str, tuple[int | str, ...]],
     kinds: Mapping[str, str] | None = None,
     axes: Axes | None = None,
-    optional: Collection[str] = (),
     remedy: str = REGENERATE,
 ) -> dict[str, np.ndarray]:
     """Load the arrays of an npz that a stage needs, and no others.
@@ -55,7 +54,7 @@ def load_arrays(
         shapes, kinds = {**shapes, **dict.fromkeys(of, ())}, kinds | of
     try:
         with zipfile.ZipFile(path) as archive:
-            members = _checked_members(archive, path, shapes, kinds, optional, remedy)
+            members = _checked_members(archive, path, shapes, kinds, remedy)
             arrays = {}
             for name, info in members.items():
                 arrays[name] = _read(archive, info)
@@ -126,14 +125,12 @@ def _header(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> tuple[tuple[int,
     return shape, dtype
 
 
-def _checked_members(archive, path, shapes, kinds, optional, remedy) -> dict[str, zipfile.ZipInfo]:
+def _checked_members(archive, path, shapes, kinds, remedy) -> dict[str, zipfile.ZipInfo]:
     listed = archive.namelist()
     sizes: dict[str, int] = {}
     members = {}
     for name, shape in shapes.items():
-        if (count := listed.count(f"{name}.npy")) == 0 and name in optional:
-            continue
-        if count != 1:
+        if (count := listed.count(f"{name}.npy")) != 1:
             raise InputError(path, f"array '{name}' is {'duplicated' if count else 'missing'}", remedy)
         members[name] = info = archive.getinfo(f"{name}.npy")
         if info.compress_type not in _BOUNDED:

@@ -1,7 +1,7 @@
 """Object models in the layout of the BOP benchmark: models/obj_000001.ply and models_info.json, in millimeters.
 
-Format: https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_format.md. Symmetries are read from
-models_info.json, or else sought on the cloud."""
+Format: https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_format.md.
+"""
 
 import math
 import re

@@ -148,7 +148,6 @@ def shade(view: View, colors_M_3: np.ndarray, T_world_camera: np.ndarray) -> np.
 
 
 def direction(azimuth: float, elevation: float) -> np.ndarray:
-    """Return the unit vector (3,) at these angles, in radians."""
     return np.array([*(np.cos(elevation) * np.array([np.cos(azimuth), np.sin(azimuth)])), np.sin(elevation)])
 
 

@@ -1,8 +1,7 @@
 """Surfaces into canonical clouds: sampled uniformly, centered on the bounding box, measured by diameter, checked.
 
-Samples that show objects of one family of shapes, or one scene, form a *cluster*, which is never split between training
-and test where objects or scenes are unseen. Clusters are dealt into *folds*, drawn or read from files (data/README.md);
-each seed leaves one fold unseen. The role is ``development`` (settings are chosen on it), ``evaluation`` or ``unused``.
+A family of shapes, or a scene, is a *cluster*, never split between training and test. Clusters are dealt into *folds*
+(data/README.md); each seed leaves one fold unseen.
 """
 
 from __future__ import annotations
@@ -15,9 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gpca import seeds
 from gpca.errors import InputError
-from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
+from gpca.io.arrays import REGENERATE, TEXT, WHOLE
+from gpca.io.container import Container, array
 from gpca.io.csv_file import read_csv
 from gpca.io.files import is_name
 from gpca.objects.sizes import LARGEST_DIAMETER_M, SMALLEST_DIAMETER_M, require_size
@@ -52,10 +51,9 @@ def require_points(points: np.ndarray, subject: object) -> None:
             off = np.abs(points[:, coarse_3].astype(kind) - points[:, coarse_3]) / step_3[coarse_3]
             rounded = (off < NEARLY).all()
         if extent > 0 and coarse_3.any() and rounded:
-            step, largest = step_3.max(), largest_3[coarse_3].max()
-            fault = f"at coordinates of {largest:.3g}, {kind.__name__} has steps of {step:.2g}, but all points span "
+            steps = f"at coordinates of {largest_3.max():.3g}, {kind.__name__} has steps of {step_3.max():.2g}"
             remedy = "subtract an offset before saving it, from source and target alike"
-            raise InputError(subject, f"{fault}{extent:.2g}", remedy)
+            raise InputError(subject, f"{steps}, but all points span {extent:.2g}", remedy)
 
 
 def diameter(points: np.ndarray, subject: object) -> float:
@@ -86,24 +84,18 @@ def canonical_cloud(surface: Surface, source: str, n_points: int = 16384) -> tup
     subject = f"{source}: object '{surface.name}'"
     vertices_m = np.asarray(surface.vertices_m, dtype=np.float64)
     require_points(vertices_m, subject)
-    random = seeds.generator(source, surface.name, "surface")
+    if (count := len(vertices_m) if surface.faces is None else n_points) < FEWEST_CLOUD_POINTS:
+        raise InputError(subject, f"has {count} point(s)", f"give {FEWEST_CLOUD_POINTS} or more")
+    if surface.faces is not None and not np.abs(_area_vectors(vertices_m, surface.faces)).sum() > 0:
+        raise InputError(subject, "the mesh has no area", "export it again with its faces")
+    diameter_m = diameter(_used_vertices(surface), subject)
+    require_size(diameter_m, subject)
+    random = generator(source, surface.name, "surface")
     if surface.faces is None:
-        if len(vertices_m) < FEWEST_CLOUD_POINTS:
-            raise InputError(
-                subject, f"the cloud has {len(vertices_m)} point(s)", f"give {FEWEST_CLOUD_POINTS} or more"
-            )
-        diameter_m = diameter(vertices_m, subject)
-        require_size(diameter_m, subject)
         order = random.permutation(len(vertices_m))
         normals = normals_towards_camera(surface.vertices_m) if surface.normals is None else surface.normals
         points_m, normals = surface.vertices_m[order], normals[order]
     else:
-        if n_points < FEWEST_CLOUD_POINTS:
-            raise InputError(subject, f"{n_points} surface points", f"ask for {FEWEST_CLOUD_POINTS} or more")
-        if not np.linalg.norm(_area_vectors(vertices_m, surface.faces), axis=1).sum() > 0:
-            raise InputError(subject, "the mesh has no area", "export it again with its faces")
-        diameter_m = diameter(_used_vertices(surface), subject)
-        require_size(diameter_m, subject)
         points_m, face = sample_surface(vertices_m, surface.faces, n_points, random)
         normals = _area_vectors(surface.vertices_m, surface.faces[face])
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
@@ -213,7 +205,7 @@ def write_objects(
     objects = sample_objects(filter(is_used, surfaces) if places else surfaces, source, n_points)
     if places:
         families, folds = zip(*((places[name].cluster, places[name].fold) for name in objects.names), strict=True)
-        objects = replace(objects, families=families, folds=folds)
+        objects = replace(objects, families=np.array(families), folds=np.array(folds))
     objects.save(path, source)
 
 
@@ -229,86 +221,67 @@ def sample_objects(surfaces: Iterable[Surface], source: str, n_points: int = 163
         sampled[surface.name] = canonical_cloud(surface, source, n_points)
     if not sampled:
         raise InputError(source, "the source has no object", "check its location and files")
-    diameters_m = np.array([diameter_m for *_, diameter_m in sampled.values()])
+    points_m, normals, diameters_m = zip(*sampled.values(), strict=True)
     return ObjectClouds(
-        tuple(sampled), diameters_m, tuple((points, normals) for points, normals, _ in sampled.values())
+        names=np.array(list(sampled)),
+        points_m=np.concatenate(points_m),
+        normals=np.concatenate(normals),
+        offsets=np.cumsum([0, *map(len, points_m)], dtype=np.int64),
+        diameters_m=np.array(diameters_m),
+        families=np.array([instance_of(name) for name in sampled]),
+        folds=np.full(len(sampled), DRAWN),
     )
 
 
 @dataclass(frozen=True)
-class ObjectClouds:
-    """The canonical clouds of one source, as :func:`write_objects` wrote them."""
+class ObjectClouds(Container):
+    """The canonical clouds of the O objects of one source, as :func:`write_objects` wrote them."""
 
-    names: tuple[str, ...]  # of the O objects
-    diameters_m: np.ndarray  # (O,) float64
-    clouds: tuple[tuple[np.ndarray, np.ndarray], ...]  # points (P, 3) in meters and unit normals (P, 3), float32
-    families: tuple[str, ...] = ()  # of each object, from a file of splits; without one, each instance is a family
-    folds: tuple[int, ...] = ()
+    names: np.ndarray = array("O", TEXT)
+    points_m: np.ndarray = array("P 3", offsets="offsets")  # float32, each centered on the object's bounding box
+    normals: np.ndarray = array("P 3", offsets="offsets")  # float32, of unit length
+    offsets: np.ndarray = array("O+1", WHOLE)
+    diameters_m: np.ndarray = array("O", least=SMALLEST_DIAMETER_M, most=LARGEST_DIAMETER_M)
+    families: np.ndarray = array("O", TEXT)  # from a file of splits; without one, each instance is a family
+    folds: np.ndarray = array("O", WHOLE)  # that leave an object unseen; `DRAWN` where no file has them
 
     @classmethod
-    def load(cls, path: str | Path, source: str | None = None) -> ObjectClouds:
-        """Read an objects npz, of this source unless it names none: users' own rules write such files."""
-        shapes: dict[str, tuple[int | str, ...]] = dict.fromkeys(("names", "diameters_m", "families", "folds"), ("O",))
-        shapes |= {"points_m": ("P", 3), "normals": ("P", 3), "offsets": ("E",)}
-        kinds = dict.fromkeys(shapes, REAL) | {"names": TEXT, "offsets": WHOLE, "families": TEXT, "folds": WHOLE}
-        axes = None if source is None else (source, None)
-        arrays = load_arrays(path, shapes, kinds, axes, optional=("source", "families", "folds"))
-        points_m, offsets, names = arrays["points_m"], arrays["offsets"], arrays["names"].tolist()
-        whole = len(offsets) == len(names) + 1 and offsets[0] == 0 and offsets[-1] == len(points_m)
-        if not whole or not names or not (np.diff(offsets) > 0).all():
-            raise InputError(path, "names, offsets and points do not match", REGENERATE)
-        if len(set(names)) < len(names):
+    def load(cls, path: str | Path, source: str | None = None) -> ObjectClouds:  # type: ignore[override]
+        """Read an objects npz, of this source unless it names none."""
+        return super().load(path, (source, None) if source else None)
+
+    def save(self, path: str | Path, source: str) -> None:  # type: ignore[override]
+        """Write the objects npz, and list the objects on stderr."""
+        super().save(path, (source, None))
+        for name, points, diameter_m in zip(self.names, np.diff(self.offsets), self.diameters_m, strict=True):
+            print(f"{source}: {name}: {points} points, {1e3 * diameter_m:.1f} mm", file=sys.stderr)
+
+    def check(self, path: str | Path) -> None:
+        """Raise an InputError also where a name occurs twice, or points and normals are no canonical cloud."""
+        super().check(path)
+        if len(set(self.names.tolist())) < len(self):
             raise InputError(path, "contains two objects with the same name", REGENERATE)
-        parts = (np.split(arrays[key], offsets[1:-1]) for key in ("points_m", "normals"))
-        optional = {name: tuple(arrays[name].tolist()) for name in ("families", "folds") if name in arrays}
-        objects = cls(tuple(names), arrays["diameters_m"], tuple(zip(*parts, strict=True)), **optional)
-        for i, (name, diameter_m) in enumerate(zip(names, objects.diameters_m, strict=True)):
-            subject = f"{path}, object '{name}'"
-            if not SMALLEST_DIAMETER_M <= diameter_m <= LARGEST_DIAMETER_M:
-                raise InputError(subject, f"its diameter is {diameter_m:.4g} m", REGENERATE)
+        for i, diameter_m in enumerate(self.diameters_m):
+            subject = f"{path}, object '{self.names[i]}'"
             # From the center of its box, no point of an object is farther away than its diameter.
-            extent_m = float(np.linalg.norm(np.ptp(objects.points(i), axis=0)))
-            if np.abs(objects.points(i)).max() > diameter_m or extent_m < SMALLEST_EXTENT * diameter_m:
+            extent_m = float(np.linalg.norm(np.ptp(self.points(i), axis=0)))
+            if np.abs(self.points(i)).max() > diameter_m or extent_m < SMALLEST_EXTENT * diameter_m:
                 fault = f"its points span {extent_m:.4g} m, its diameter is {diameter_m:.4g} m"
                 raise InputError(subject, f"{fault}, or they are not centered", REGENERATE)
-            if np.abs(np.linalg.norm(objects.normals(i), axis=1) - 1).max() > UNIT_TOLERANCE:
+            if np.abs(np.linalg.norm(self.normals_of(i), axis=1) - 1).max() > UNIT_TOLERANCE:
                 raise InputError(subject, "a normal is not of unit length", REGENERATE)
-        return objects
-
-    def __len__(self) -> int:
-        return len(self.names)
 
     def points(self, i: int) -> np.ndarray:
         """(P, 3) float32, meters, centered on the object's bounding box."""
-        return self.clouds[i][0]
+        return self.part("points_m", i)
 
-    def normals(self, i: int) -> np.ndarray:
+    def normals_of(self, i: int) -> np.ndarray:
         """(P, 3) float32 unit normals."""
-        return self.clouds[i][1]
+        return self.part("normals", i)
 
-    def family(self, i: int) -> str:
-        """Return the family of an object's shape."""
-        return self.families[i] if self.families else instance_of(self.names[i])
-
-    def fold(self, i: int) -> int:
-        """Return the fold that leaves an object unseen; `DRAWN` where no file has one."""
-        return self.folds[i] if self.folds else DRAWN
-
-    def save(self, path: str | Path, source: str) -> None:
-        """Write the objects npz, and list the objects on stderr."""
-        points_m, normals = zip(*self.clouds, strict=True)
-        arrays = {
-            "names": np.array(self.names),
-            "points_m": np.concatenate(points_m),
-            "normals": np.concatenate(normals),
-            "offsets": np.cumsum([0, *map(len, points_m)], dtype=np.int64),
-            "diameters_m": self.diameters_m,
-        }
-        if self.families:
-            arrays |= {"families": np.array(self.families), "folds": np.array(self.folds)}
-        save_arrays(path, arrays, (source, None))
-        for name, cloud_m, diameter_m in zip(self.names, points_m, self.diameters_m, strict=True):
-            print(f"{source}: {name}: {len(cloud_m)} points, {1e3 * diameter_m:.1f} mm", file=sys.stderr)
+    def row(self, name: str) -> int:
+        """Return the number of an object."""
+        return self.names.tolist().index(name)
 
 
 DRAWN = -1  # the fold of what no file deals into folds

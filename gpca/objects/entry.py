@@ -56,10 +56,9 @@ def dataset_of(entry: Mapping) -> str:
     return PurePath(entry.get("location") or "").name if entry.get("kind") == "bop" else ""
 
 
-def stand_in_clause(entries: Iterable[Mapping], partly: bool = True) -> str:
-    """Return the clause that ends a caption when a source is a stand-in, if `partly` with "partly" for a mixture."""
+def stand_in_clause(entries: Iterable[Mapping]) -> str:
+    """Return the clause that ends a caption when a source is a stand-in, with "partly" for a mixture."""
     stand_ins = [bool(entry["stand_in"]) for entry in entries]
     if not any(stand_ins):
         return ""
-    share = "partly " if partly and not all(stand_ins) else ""
-    return f", measured {share}on {STAND_IN}s for the datasets' objects"
+    return f", measured {'' if all(stand_ins) else 'partly '}on {STAND_IN}s for the datasets' objects"

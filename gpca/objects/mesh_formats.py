@@ -1,12 +1,12 @@
 """Readers of PLY, OBJ, STL and OFF. A file must hold what it declares.
 
-Rows that are too wide, lists of another length, misspelled keywords and an early end are faults. Vertices and faces are
-those of trimesh, in its order, without its import, which takes longer than an explanation.
+Rows that are too wide, lists of another length, misspelled keywords and an early end are faults. trimesh would take
+longer to import than an explanation takes.
 """
 
 import os
+import re
 from collections.abc import Callable, Iterator
-from operator import itemgetter
 from typing import IO, Any, NamedTuple
 
 import numpy as np
@@ -27,20 +27,19 @@ AXES, NORMALS = (b"x", b"y", b"z"), (b"nx", b"ny", b"nz")
 CORNERS = (b"vertex_index", b"vertex_indices")  # names of the corners of a face in PLY
 PLY_ORDERS = {b"ascii": "", b"binary_little_endian": "<", b"binary_big_endian": ">"}  # of bytes
 PLY_KINDS = {
-    **{b"char": "i1", b"uchar": "u1", b"short": "i2", b"ushort": "u2"},
-    **{b"int": "i4", b"uint": "u4", b"float": "f4", b"double": "f8"},
-    **{
-        b"%sint%d" % (sign, 8 * size): f"{'u' * len(sign) or 'i'}{size}"
-        for sign in (b"", b"u")
-        for size in (1, 2, 4, 8)
-    },
-    **{b"float%d" % (8 * size): f"f{size}" for size in (2, 4, 8)},
+    word: kind
+    for kind, words in {
+        **{"i1": b"char int8", "u1": b"uchar uint8", "i2": b"short int16", "u2": b"ushort uint16", "i4": b"int int32"},
+        **{"u4": b"uint uint32", "i8": b"int64", "u8": b"uint64", "f2": b"float16"},
+        **{"f4": b"float float32", "f8": b"double float64"},
+    }.items()
+    for word in words.split()
 }
-# The keywords of the lines of a facet, and how many numbers follow.
-STL_FACET = ((b"facet normal", 3), (b"outer loop", 0), *[(b"vertex", 3)] * 3, (b"endloop", 0), (b"endfacet", 0))
+STL_FACET = rb"facet\s+normal(?:\s+\S+){3}\s+outer\s+loop(?:\s+vertex(?:\s+\S+){3}){3}\s+endloop\s+endfacet"
+STL_TEXT = re.compile(rb"(?i)(?:\s*solid[^\n]*+(?:\s*" + STL_FACET + rb")*+\s*endsolid[^\n]*+)++\s*")
+STL_VERTEX = re.compile(rb"(?im)^\s*vertex\s+(\S+\s+\S+\s+\S+)")
 STL_HEAD_BYTES = 84  # of binary STL; the head ends with the number of facets
 STL_FACETS = np.dtype([("normal", "<f4", 3), ("vertices", "<f4", (3, 3)), ("attributes", "<u2")])
-QUAD = ((0, 1, 2), (2, 3, 0))  # the triangles of a quad; other polygons are fans
 
 
 class Shape(NamedTuple):
@@ -215,9 +214,8 @@ def _read_off(file: IO[bytes]) -> Shape:
 
 def _read_obj(file: IO[bytes]) -> Shape:
     rows: list[bytes] = []  # of vertices
-    groups: dict[bytes, list] = {}  # faces of each material: numbers of vertex, texture and normal of their corners
-    widths: dict[bytes, set[int]] = {}  # how many numbers its faces have
-    material, relative_at, others, has_normals, before = b"", -1, False, False, b""
+    polygons: list[list[int]] = []
+    others, before = False, b""
     for number, line in enumerate(text_lines(file), start=1):
         line = before + line.split(b"#")[0].rstrip()
         before = line[:-1] + b" " if line.endswith(b"\\") else b""  # it continues in the next line
@@ -229,48 +227,18 @@ def _read_obj(file: IO[bytes]) -> Shape:
                 raise ValueError(f"line {number}: a vertex has {len(words)} numbers or a weight other than 1")
             rows.append(b" ".join(words[:3]))
         elif keyword == b"f":
-            corners = [(*map(int, word.rstrip(b"/").replace(b"//", b"/0/").split(b"/")), 0, 0)[:3] for word in words]
-            vertices = [vertex for vertex, *_ in corners]
-            if len(corners) < 3 or 0 in vertices:
+            corners = [int(word.split(b"/")[0]) for word in words]
+            if len(corners) < 3 or 0 in corners:
                 raise ValueError(f"line {number}: a face has {len(corners)} corners or refers to vertex 0")
-            if min(vertices) < 0:
-                relative_at = len(rows)
-            groups.setdefault(material, []).append(corners)
-            widths.setdefault(material, set()).add(len(line.replace(b"/", b" ").split()))
-        elif keyword == b"usemtl":
-            material = b" ".join(words)
-        has_normals |= keyword == b"vn"
+            polygons.append([corner - 1 if corner > 0 else len(rows) + corner for corner in corners])
         others |= keyword in (b"l", b"p")  # lines and points use vertices, too
-    if not groups:
+    if not polygons:
         raise InputError(file.name, "has no faces", "export it again, or give the points as PLY")
-    # The materials stand in reverse, and a vertex is repeated for each of its textures and normals.
-    corners_K_3 = [
-        as_triangles(groups[name], by_length=len(widths[name]) == 1).reshape(-1, 3) for name in reversed(groups)
-    ]
-    for vertex_K in (corners[:, 0] for corners in corners_K_3):
-        vertex_K += np.where(vertex_K < 0, len(rows), -1)
-    used = np.unique(np.concatenate(corners_K_3)[:, 0])
-    if used[0] < 0 or used[-1] >= len(rows):
-        raise ValueError("a face refers to a missing vertex")
-    if relative_at not in (-1, len(rows)):
-        raise ValueError("faces use relative numbers before the last vertex; export it with absolute numbers")
-    if not others and len(used) < (1 - LARGEST_UNUSED_SHARE) * len(rows):
-        raise ValueError(f"{len(rows) - len(used)} of {len(rows)} vertices belong to no face, as in a truncated file")
-    chosen, faces, count = [], [], 0
-    for vertex_K, texture_K, normal_K in (corners.T for corners in corners_K_3):
-        key_K, with_texture = vertex_K, texture_K.all()
-        for number_K, counts in (
-            (texture_K, with_texture),
-            (normal_K, normal_K.all() and (with_texture or has_normals)),
-        ):
-            if counts:
-                number_K = number_K - number_K.min()
-                key_K = np.unique(key_K * (number_K.max() + 1) + number_K, return_inverse=True)[1]
-        _, first, inverse_K = np.unique(key_K, return_index=True, return_inverse=True)
-        chosen.append(vertex_K[first])
-        faces.append(count + inverse_K.reshape(-1, 3))
-        count += len(first)
-    return Shape(_numbers(rows, 3)[np.concatenate(chosen)], np.concatenate(faces))
+    faces = as_triangles(polygons)
+    unused = len(rows) - len(np.unique(faces))
+    if not others and unused > LARGEST_UNUSED_SHARE * len(rows):
+        raise ValueError(f"{unused} of {len(rows)} vertices belong to no face, as in a truncated file")
+    return Shape(_numbers(rows, 3), faces)
 
 
 def _read_stl(file: IO[bytes]) -> Shape:
@@ -278,29 +246,10 @@ def _read_stl(file: IO[bytes]) -> Shape:
     if size == STL_HEAD_BYTES + STL_FACETS.itemsize * int.from_bytes(head[80:], "little"):
         file.seek(STL_HEAD_BYTES)
         return _loose(np.frombuffer(file.read(), STL_FACETS)["vertices"])
-    if not head.lstrip().lower().startswith(b"solid"):
-        raise ValueError("it neither begins with 'solid' nor has the length that its number of facets needs")
     file.seek(0)
-    rows, place, keyword = [], 0, b"solid"  # within the facet, and of the line before
-    for number, line in enumerate(text_lines(file), start=1):
-        words = line.lower().split()
-        if not words:
-            continue
-        if place == 0 and words[0] in (b"solid", b"endsolid"):
-            keyword = words[0]
-            continue
-        keyword, wanted = STL_FACET[place]
-        length = len(keyword.split())
-        if (written := b" ".join(words[:length])) != keyword:
-            raise ValueError(f"line {number}: {quoted(written)} stands where {quoted(keyword)} should")
-        if (numbers := len(words) - length) != wanted:
-            raise ValueError(f"line {number}: {quoted(keyword)} has {numbers} numbers")
-        if wanted and keyword == b"vertex":
-            rows.append(b" ".join(words[1:]))
-        place = (place + 1) % len(STL_FACET)
-    if keyword != b"endsolid":
-        raise ValueError("it ends before 'endsolid'")
-    return _loose(_numbers(rows, 3))
+    if not STL_TEXT.fullmatch(text := b"".join(text_lines(file))):
+        raise ValueError("it is neither whole facets from 'solid' to 'endsolid' nor as long as their number needs")
+    return _loose(_numbers(STL_VERTEX.findall(text), 3))
 
 
 def _loose(corners: np.ndarray) -> Shape:
@@ -316,22 +265,12 @@ READERS: dict[str, Callable[[IO[bytes]], Shape]] = {  # ValueError for a file th
 }
 
 
-def as_triangles(polygons: np.ndarray | list, by_length: bool = True) -> np.ndarray:
-    """Return the triangles (F, 3, ...) of polygons: triangles, halves of quads, then fans; or in their order."""
+def as_triangles(polygons: np.ndarray | list) -> np.ndarray:
+    """Return the triangles (F, 3) of polygons, each a fan around its first corner."""
     if set(map(len, polygons)) == {3}:
         return np.array(polygons, np.int64)
-    parts = [
-        (min(len(polygon), 5), half if len(polygon) == 4 else 0, [polygon[i] for i in corners])
-        for polygon in polygons
-        for half, corners in enumerate(QUAD if len(polygon) == 4 else _fan(len(polygon)))
-    ]
-    if by_length:
-        parts.sort(key=itemgetter(0, 1))
-    return np.array([triangle for *_, triangle in parts] or np.zeros((0, 3)), np.int64)
-
-
-def _fan(corners: int) -> list[tuple[int, int, int]]:
-    return [(0, i, i + 1) for i in range(1, corners - 1)]
+    fans = [(polygon[0], polygon[i], polygon[i + 1]) for polygon in polygons for i in range(1, len(polygon) - 1)]
+    return np.array(fans, np.int64).reshape(-1, 3)
 
 
 def _numbers(rows: list[bytes], columns: int) -> np.ndarray:

@@ -1,7 +1,6 @@
 """Point clouds in files: PCD (0.6, 0.7), NumPy's, text, and bin of scanners; rows without a measurement are kept.
 
-Open3D's reader of PCD (0.19) fills gaps of a cut file with whatever the memory holds. As a kind of source, single views
-of the UW RGB-D Object Dataset (Lai et al. 2011): PCD files named <class>_<instance>_<sequence>_<frame>, in meters.
+As a kind of source, views of the UW RGB-D Object Dataset: PCD named <class>_<instance>_<sequence>_<frame>, in meters.
 """
 
 import io

@@ -1,7 +1,6 @@
-"""Objects made by the package itself: stand-ins for real data, needing no file and no download.
+"""Stand-ins made by the package: a few solids in millimeters, z up, stretched to the extents of what they stand for.
 
-Each is a few solids in millimeters, z up, stretched to the extents of the object that it stands in for: those in BOP's
-models_info.json for LINEMOD (x to the front), and those of the published google_16k scans for YCB.
+Extents are those of BOP's models_info.json for LINEMOD (x to the front), and of the google_16k scans for YCB.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -35,7 +34,6 @@ def surfaces(family: str) -> Iterator[Surface]:
 
 
 def require_family(family: str) -> None:
-    """Raise an InputError for an unknown family."""
     if family not in FAMILIES:
         raise InputError(f"family '{family}'", "no such procedural family", f"choose one of {', '.join(FAMILIES)}")
 
@@ -97,12 +95,10 @@ def tube(path: Sequence[Point], radii: float | Sequence[float]) -> Manifold:
 
 
 def hull(*solids: Manifold) -> Manifold:
-    """Return the convex hull of all solids together."""
     return Manifold.batch_hull(list(solids))
 
 
 def union(*solids: Manifold) -> Manifold:
-    """Return the union of all solids."""
     return Manifold.batch_boolean(list(solids), OpType.Add)
 
 

@@ -28,7 +28,6 @@ IN_PYTHON = Remedies("pass unit='{}'", "pass source_unit='{}', unit='{}'", "scan
 
 
 def is_of_an_object(diameter_m: float) -> bool:
-    """Return whether an object may have this diameter."""
     return SMALLEST_DIAMETER_M <= diameter_m <= LARGEST_DIAMETER_M
 
 
@@ -47,7 +46,6 @@ def require_size(diameter_m: float, subject: object, unit: str | None = None, sa
 
 
 def extent(points: np.ndarray) -> float:
-    """Return the diagonal of the upright box of points (N, 3)."""
     return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 

@@ -139,29 +139,24 @@ def describe_distances(pair: ObservedPair, matched: MatchedPair | None = None) -
 def describe_points(pair: ObservedPair, matched: MatchedPair, points: int) -> np.ndarray:
     """Return (2, points, `CHANNELS`) float32, of the observed cloud and of the model.
 
-    Coordinates (diameters); logarithms of the distance to the nearest point of the other cloud, relative to the spacing
-    of the model, of the distance from that point's local plane, relative to the model's usual thickness, and of the own
-    thickness relative to that point's; |cosine| between the normals. Clouds of fewer points repeat some.
+    Coordinates (diameters); logarithms of the distances from the nearest point of the other cloud and from its plane,
+    and of the own thickness relative to its; |cosine| between the normals. Clouds of fewer points repeat some.
     """
     spacing = float(np.median(matched.model.spacing))
     usual_thickness = float(np.median(matched.model.thickness))
     observed, model = matched.observed, matched.model
 
     log_ratio = partial(log_of_ratio, spacing=spacing)
-    of_observed = (
-        log_ratio(matched.to_model_N, spacing),
-        log_ratio(matched.plane_N, usual_thickness),
-        log_ratio(observed.thickness, model.thickness[matched.partner_N]),
-        matched.cosine_N,
-    )
-    of_model = (
-        log_ratio(matched.to_observed_M, spacing),
-        log_ratio(matched.plane_M, usual_thickness),
-        log_ratio(model.thickness, observed.thickness[matched.partner_M]),
-        np.abs(dots(model.normals, observed.normals[matched.partner_M])),
-    )
-    sides = (np.column_stack([pair.observed, *of_observed]), np.column_stack([pair.model, *of_model]))
-    return np.stack([side[np.arange(points) % len(side)] for side in sides]).astype(np.float32)
+    sides = []
+    for cloud, own, other, partner, distance, from_plane in (
+        (pair.observed, observed, model, matched.partner_N, matched.to_model_N, matched.plane_N),
+        (pair.model, model, observed, matched.partner_M, matched.to_observed_M, matched.plane_M),
+    ):
+        logs = log_ratio(distance, spacing), log_ratio(from_plane, usual_thickness)
+        relative = log_ratio(own.thickness, other.thickness[partner])
+        side = np.column_stack([cloud, *logs, relative, np.abs(dots(own.normals, other.normals[partner]))])
+        sides.append(side[np.arange(points) % len(side)])
+    return np.stack(sides).astype(np.float32)
 
 
 def log_of_ratio(lengths: np.ndarray, to: np.ndarray | float, spacing: float) -> np.ndarray:
@@ -230,12 +225,10 @@ def describe_registrations(registrations: Registrations, *axes: object, points: 
 
 
 def relations(pair: ObservedPair, distances: np.ndarray, planes: np.ndarray) -> np.ndarray:
-    """Return 35 numbers that compare the clouds with what the model alone would give.
+    """Return 35 numbers that compare the clouds with the model's own spacing and thickness, alike for all objects.
 
-    An object's own shape sets how far its points lie apart and how thick its local planes are; relative to these,
-    logarithms of quantiles are alike for all objects: of the distances both ways, of those from the planes both ways,
-    of the observed thickness. Then |cosine| between normals, and the motion: angle (radians), length and displacement
-    (diameters), fitness, and the inlier RMSE relative to the spacing.
+    Logarithms of quantiles of distances and thickness; |cosine| between normals; the motion: angle (radians), length
+    and displacement (diameters), fitness, and the inlier RMSE relative to the spacing.
     """
     to_model, to_observed, from_plane, thickness = distances.reshape(4, QUANTILES)[:, COARSE]
     from_observed_plane, cosine, model_thickness = planes[: 3 * QUANTILES].reshape(3, QUANTILES)[:, COARSE]

@@ -1,8 +1,4 @@
-"""Controlled perturbations, one concept at a time (paper Sec. IV-A): noise, pose, overlap.
-
-A perturbation makes the observed **source** cloud from clean points of the object. Lengths are relative to the object's
-diameter. Severities are drawn uniformly from the ranges of :class:`Severities`, the same for every source.
-"""
+"""Controlled perturbations of the source, one concept at a time (paper Sec. IV-A); lengths are in diameters."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
@@ -11,9 +7,8 @@ from typing import Annotated, Literal, get_args
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gpca.errors import InputError
 from gpca.rigid import inverse, random_direction, rigid_motion, transform
-from gpca.settings import Bounds, Share
+from gpca.settings import Bounds, Share, require_ascending
 
 Concept = Literal["noise", "pose", "overlap"]
 CONCEPTS: tuple[str, ...] = get_args(Concept)
@@ -36,10 +31,7 @@ class Severities:
     crop: tuple[Hidden, Hidden] = (0.20, 0.60)  # of the points, cut off by a half-space in a random direction
 
     def __post_init__(self) -> None:
-        for severity in fields(self):
-            low, high = getattr(self, severity.name)
-            if low > high:
-                raise InputError(f"severity {severity.name}", f"[{low}, {high}] is in descending order", "swap the two")
+        require_ascending("severity ", self, *(severity.name for severity in fields(self)))
 
 
 @dataclass(frozen=True)
@@ -53,7 +45,6 @@ class Perturbed:
 
 
 def add_noise(points: np.ndarray, severities: Severities, random: np.random.Generator) -> Perturbed:
-    """Add Gaussian jitter to every point."""
     sigma = random.uniform(*severities.noise)
     return Perturbed(points + random.normal(scale=sigma, size=points.shape), severity={"noise": sigma})
 

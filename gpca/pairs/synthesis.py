@@ -36,21 +36,13 @@ class RegistrationSettings:
     severities: Severities = field(default_factory=Severities)
     icp: ICPSettings = field(default_factory=ICPSettings)
 
-    @classmethod
-    def from_dict(cls, settings: dict) -> RegistrationSettings:
-        """Build from the config's section ``registrations``."""
-        settings = dict(settings)
-        severities = {name: tuple(limits) for name, limits in settings.pop("severities", {}).items()}
-        return cls(severities=Severities(**severities), icp=ICPSettings(**settings.pop("icp", {})), **settings)
-
 
 def make_registrations(
     objects: ObjectClouds, source: str, seed: int, settings: RegistrationSettings
 ) -> tuple[Registrations, np.ndarray]:
     """Return the registrations of one source and seed, and the seconds (S,) of ICP.
 
-    Samples 3t, 3t + 1 and 3t + 2 of a split show object t mod O under the three concepts in random order. Random
-    numbers are named by source, seed, split and number, so that a sample does not depend on how many there are.
+    Samples 3t, 3t + 1 and 3t + 2 of a split show object t mod O under the three concepts in random order.
     """
     require_open3d()  # here, so that the first sample's seconds do not include its import
     samples = [(split, n) for split in SPLITS for n in range(getattr(settings, split))]
@@ -78,15 +70,15 @@ def align_pair(
     diameter_m = float(objects.diameters_m[object_index])
     target = objects.points(object_index)[target_rows] / diameter_m
     started = perf_counter()
-    icp = ICP(target, objects.normals(object_index)[target_rows], icp_settings)
+    icp = ICP(target, objects.normals_of(object_index)[target_rows], icp_settings)
     registration = icp.register(perturbed.points, np.eye(4))
     icp_seconds = perf_counter() - started
     return {
         "object_index": object_index,
         "object_name": str(objects.names[object_index]),
         "diameter_m": diameter_m,
-        "cluster": objects.family(object_index),
-        "fold": objects.fold(object_index),
+        "cluster": objects.families[object_index],
+        "fold": objects.folds[object_index],
         "cloud": transform(registration.T_target_source, perturbed.points).astype(np.float32),
         "target": target.astype(np.float32),
         "T_target_source_true": scale_translation(perturbed.T_target_source_true, diameter_m),

@@ -19,9 +19,8 @@ def trivial_numbers(
 ) -> np.ndarray:
     """Return `TRIVIAL` of a pair after ICP, in diameters.
 
-    `T_init` takes the observed cloud back to where ICP started. The turn is in radians; the shift is that of the
-    cloud's center. The extent is the root mean square distance from the center, the spacing the median distance to the
-    nearest other point.
+    `T_init` takes the observed cloud back to where ICP started. The shift is that of the cloud's center, the extent the
+    root mean square distance from it, the spacing the median distance to the nearest other point.
     """
     from scipy.spatial import cKDTree
 
@@ -37,7 +36,6 @@ def trivial_numbers(
 
 
 def trivial_numbers_of(registrations: Registrations) -> np.ndarray:
-    """Return `TRIVIAL` of N registrations (N, 10)."""
     rows = []
     for row in range(len(registrations)):
         observed, model = (cloud.astype(np.float64) for cloud in (registrations.cloud(row), registrations.target(row)))

@@ -39,7 +39,7 @@ class Robot:
     def __init__(self, situation: Situation, axes: tuple = ()) -> None:
         shelf, model = situation.shelf, situation.model
         self.points_m = shelf.objects.points(model)
-        self.normals = shelf.objects.normals(model)
+        self.normals = shelf.objects.normals_of(model)
         self.vertices_m = shelf.surfaces[model].vertices_m
         self.faces = shelf.surfaces[model].triangles
         self.diameter_m = situation.diameter_m

@@ -15,7 +15,7 @@ from gpca.frames.situations import SituationSettings
 from gpca.objects.camera import Camera
 from gpca.pairs.synthesis import RegistrationSettings
 from gpca.reenactment.settings import ReenactmentSettings
-from gpca.settings import Bounds, Count
+from gpca.settings import Bounds, Count, read_settings
 from gpca.uncertainty.settings import UncertaintySettings
 
 
@@ -50,9 +50,9 @@ class RecoverySettings:
     def from_sections(cls, sections: Mapping[str, dict]) -> RecoverySettings:
         """Build from the sections of the config, ``explainers`` and ``reenactment`` by name."""
         recovery, success = sections["recovery"], sections["success"]["error"]
-        registration = RegistrationSettings.from_dict(sections["registrations"])
+        registration = read_settings(RegistrationSettings, sections["registrations"])
         camera, icp = Camera(**recovery["camera"]), registration.icp
-        scenes = replace(SceneSettings.from_dict(sections["scenes"]), count=recovery["tables"], camera=camera)
+        scenes = replace(read_settings(SceneSettings, sections["scenes"]), count=recovery["tables"], camera=camera)
         ranges = tuple(recovery["noise_scale"]), tuple(recovery["hidden"])
         limits = Limits(min(Limits.nominal, success), success)
         return cls(

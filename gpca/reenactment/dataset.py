@@ -31,9 +31,8 @@ from gpca.rigid import inverses, transform
 def verdict(error_S_K_8: np.ndarray, weight_S_K: np.ndarray, limits: Limits) -> np.ndarray:
     """Return the probabilities (S, 4) of nominal and of each cause to be the dominant one, of S pairs.
 
-    Under each of K hypotheses a failure is as probable as not where v̂(all) is midway between the limits, and φ̂ is
-    known up to the limit of a cause: P(cause) is its softmax at that temperature. Hypotheses are weighted by how
-    probable they are, 0 where there is none.
+    Under each of K hypotheses a failure is as probable as not where v̂(all) is midway between the limits, and P(cause)
+    is the softmax of φ̂ at the limit of a cause as temperature.
     """
     middle = np.sqrt(limits.nominal * limits.failed)
     failed_S_K = expit(STEEPNESS * np.log(np.maximum(error_S_K_8[..., ALL], SMALLEST_ERROR) / middle))
@@ -49,9 +48,7 @@ DESCRIBED = ("distances", "planes", "motion", "starts")  # groups of descriptors
 DESCRIPTORS = sum(WIDTHS[group] for group in DESCRIBED)  # number of these, the last of the features
 
 
-# What re-enacts a row where its registration comes from: it finds hypotheses of the true pose of the observed pair and
-# returns the counterfactuals under each, the most probable first. Whole objects: :mod:`gpca.reenactment.enactment`;
-# depth frames and scans: the modules of this folder so named.
+# What re-enacts the observed pair of a row where its registration comes from, the most probable hypothesis first.
 World = Callable[[ObservedPair, int], list[Enactment]]
 
 
@@ -59,11 +56,9 @@ World = Callable[[ObservedPair, int], list[Enactment]]
 class Reenactments(Container):
     """The re-enactments of S registrations under K hypotheses each, the most probable first.
 
-    Where a pair has fewer hypotheses, its first stands in the place of the others, with weight 0. Poses take what was
-    observed from where the registration began to where a hypothesis has it in the model, in diameters; errors and
-    uncertainties are v̂ and û. `MEASURED` are the numbers of :class:`gpca.reenactment.hypotheses.Hypothesis`; the
-    severities of noise, outliers and crop under it; and how far (root mean square, diameters) the observed points then
-    lie from where the registration began, and from where it ended.
+    Where a pair has fewer hypotheses, its first stands in the place of the others, with weight 0. Poses are those of
+    :class:`gpca.reenactment.hypotheses.Hypothesis`, in diameters; errors and uncertainties are v̂ and û. The last of
+    `MEASURED` are how far (root mean square) the observed points lie from where the registration began and ended.
     """
 
     sample: np.ndarray = array("S", WHOLE)
@@ -153,11 +148,7 @@ FEATURES = (
 
 
 def reenactment_features(reenactments: Reenactments) -> np.ndarray:
-    """Return `FEATURES` (S, F), and after them the descriptors of each pair.
-
-    Logarithms of v̂ and φ̂ of the two most probable hypotheses and of the mean over all; the shares of that mean φ̂; û,
-    compressed, of the first; what was measured under both; how sure the hypotheses are, and how far v̂(all) varies.
-    """
+    """Return `FEATURES` (S, F), v̂ as logarithms and û compressed, and after them the descriptors of each pair."""
     weight_S_K, error_S_K_8 = reenactments.weight, reenactments.error
     mean_S_8 = (weight_S_K[..., None] * error_S_K_8).sum(axis=1)
     errors = [error_S_K_8[:, 0], mean_S_8, error_S_K_8[:, 1]]

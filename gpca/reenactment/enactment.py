@@ -97,10 +97,8 @@ BESIDE = 0.6  # of the spacing: so far from a model's point, in its plane, a fre
 def rebuild(T: np.ndarray, observation: Observation, surface: ModelSurface, random: np.random.Generator) -> Candidate:
     """Return the pair as a candidate of the truth: what was observed is its noisy cloud, of which a part is kept.
 
-    Noise is taken away by moving each point to its plane, as far as the noise exceeds the roughness of the planes;
-    outliers become fresh points. Missing surface is filled with fresh points, as dense as the rest and as noisy, and
-    surface that the model lacks with the points that were observed there. `T` is the hypothesis: it takes what was
-    observed to the model.
+    Noise is taken away by moving each point to its plane, as far as it exceeds the roughness of the planes; outliers
+    and missing surface become fresh points, surface that the model lacks the points observed there.
     """
     noise, missing = observation.noise, float(1 - observation.covered.mean())  # of the model
     quiet = noise <= QUIET and observation.outliers < FEW_OUTLIERS

@@ -43,11 +43,7 @@ class KnownObject:
 
 @dataclass(frozen=True)
 class FrameView:
-    """A registered pair and the frame that it was observed in.
-
-    Poses `T` are hypotheses: they take what was observed, where the registration began, to the model, in diameters; the
-    identity is the initial pose.
-    """
+    """A registered pair and the frame that it was observed in; poses `T` are those of hypotheses, in diameters."""
 
     pair: ObservedPair  # the model is the side that the camera would see at the initial pose
     known: KnownObject
@@ -78,9 +74,7 @@ class FrameView:
         return side_m / self.known.subject.diameter_m, float(seen)
 
     def candidate(self, T: np.ndarray, random: np.random.Generator) -> Candidate:
-        """Return the pair as a candidate, were a hypothesis true; where no pixel shows the mesh, only its pose is
-        wrong.
-        """
+        """Return the pair, were a hypothesis true; where no pixel shows the mesh, only its pose is wrong."""
         view = clean_view(self.sighting, self.T_camera_object(T), self.known.mesh, self.known.outline_m)
         if view is None:
             measured_m = transform(T, self.before) * self.known.subject.diameter_m
@@ -103,7 +97,6 @@ IMPOSSIBLE = -1e6  # nats, of a pose at which nothing would be seen
 def find_frame_hypotheses(
     view: FrameView, settings: ReenactmentSettings, random: np.random.Generator
 ) -> list[Hypothesis]:
-    """Return the probable hypotheses, the best first."""
     before, surface = view.before, view.known.surface
     few = before[np.sort(random.permutation(len(before))[: search.FITTED])]
     ends_n = search.search_ends(before, surface, view.pair.T_runs @ inverse(view.pair.T_init), random)

@@ -1,9 +1,8 @@
 """Directions in which a pose is free: moved along one of them, what was observed fits the model as well.
 
-A twist u moves a point y by J u, and off the plane with the normal n by nᵀJ u. The six directions are the eigenvectors
-of the mean square of the latter relative to the former. An error of the normals would hold any direction, so each
-factor of the square takes normals of its own, from other points. How firmly a direction is held is how much of its
-likelihood the pose loses at some distance along it: sampled planes are not smooth enough for derivatives.
+A twist u moves a point by J u, and off the plane with the normal n by nᵀJ u. The six directions are the eigenvectors of
+the mean square of the latter relative to the former, each factor with normals from other points: an error of them would
+hold any direction. How firmly one is held is how much likelihood the pose loses at some distance along it.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,6 @@
-"""Hypotheses of the true pose, with the probability of each.
+"""Hypotheses of the true pose, by ICP from starts all over the rotations and then the mixture, and their probabilities.
 
-ICP from starts spread evenly over rotations of every size, on few points, finds where the observed cloud may lie in the
-model; the mixture (:mod:`gpca.reenactment.mixture`) refines the best ends, at last on all points. Poses take what was
-observed, where it lay before the registration, to the model: the identity is the initial pose.
+Poses take what was observed, where it lay before the registration, to the model: the identity is the initial pose.
 """
 
 from collections.abc import Callable, Iterable
@@ -102,13 +100,28 @@ def find_hypotheses(
     def fit(fitted: tuple[np.ndarray, Mixture, int, np.ndarray], T_n: np.ndarray, **options: Any) -> list[Hypothesis]:
         points, mixture, iterations, densities = fitted
         fits = mixture.fit(points, T_n, iterations, densities=densities, **options)
-        return [_hypothesis(fits, i, points, surface, settings, random, evidence) for i in range(len(T_n))]
+        return [hypothesis(fits, i, points) for i in range(len(T_n))]
+
+    def hypothesis(fits: Fits, i: int, points: np.ndarray) -> Hypothesis:
+        T, matched_N, lone_N, width = fits.T_n[i], fits.inlier_n_N[i], fits.lone_n_N[i], float(fits.width_n[i])
+        seen = transform(T, points)
+        if (matched_N > 0.5).sum() >= FEWEST_INLIERS:
+            seen = seen[matched_N > 0.5]
+        # The width is that of the noise and of the gaps between the model's points.
+        covered = share_within(surface.points, seen, 0.7 * width, random)
+        # Points of the part that was seen are the denser, the smaller it is.
+        denser = float(np.log1p(matched_N * (1 / max(covered, LEAST_COVERED) - 1)).mean())
+        likelihood = float(fits.log_likelihood_n[i])
+        log_posterior = min(len(points), INDEPENDENT) * (likelihood + denser) + log_prior(T, settings)
+        if evidence is not None:
+            log_posterior += evidence(T, width)
+        return Hypothesis(T, matched_N + lone_N, likelihood, width, covered, float(log_posterior), lone_N)
 
     free = fit(some, search_ends(observed, surface, T_found_n, random))
     held = fit(some, np.eye(4)[None], anchor=anchor_of(len(few), settings))
     first = most_probable([*free, *held], surface, settings.hypotheses, SAME)
     # On all points, the normals start as wide as they were, which leaves fewer partners.
-    T_n, width_n = (np.array([getattr(hypothesis, name) for hypothesis in first]) for name in ("T", "width"))
+    T_n, width_n = (np.array([getattr(each, name) for each in first]) for name in ("T", "width"))
     found = fit(every, T_n, width_n=width_n)
     found += fit(every, np.eye(4)[None], anchor=anchor_of(len(observed), settings), width_n=np.array([held[0].width]))
     return not_negligible(most_probable(found, surface, settings.hypotheses, SAME / 2))
@@ -162,36 +175,10 @@ def search_ends(
     return ends_n[best_n][distinct_rows(surface, ends_n[best_n], ENDS, 2 * SAME)]
 
 
-def _hypothesis(
-    fits: Fits,
-    i: int,
-    observed: np.ndarray,
-    surface: ModelSurface,
-    settings: ReenactmentSettings,
-    random: np.random.Generator,
-    evidence: Evidence | None,
-) -> Hypothesis:
-    T, matched_N, width = fits.T_n[i], fits.inlier_n_N[i], float(fits.width_n[i])
-    seen = transform(T, observed)
-    if (matched_N > 0.5).sum() >= FEWEST_INLIERS:
-        seen = seen[matched_N > 0.5]
-    # The width is that of the noise and of the gaps between the model's points.
-    covered = share_within(surface.points, seen, 0.7 * width, random)
-    # Points of the part that was seen are the denser, the smaller it is.
-    denser = float(np.log1p(matched_N * (1 / max(covered, LEAST_COVERED) - 1)).mean())
-    likelihood = float(fits.log_likelihood_n[i])
-    log_posterior = min(len(observed), INDEPENDENT) * (likelihood + denser) + log_prior(T, settings)
-    if evidence is not None:
-        log_posterior += evidence(T, width)
-    lone_N = fits.lone_n_N[i]
-    return Hypothesis(T, matched_N + lone_N, likelihood, width, covered, float(log_posterior), lone_N)
-
-
 def log_prior(T: np.ndarray, settings: ReenactmentSettings) -> float:
     """Return the logarithm of how probable a pose error is beforehand, up to a constant.
 
-    A good start's error is small, another's large, both normal in angle and length; a lost start's is any. The weights
-    are those of the kinds of start, not densities: a hypothesis stands for all poses around it.
+    Weights are those of good, bad and lost starts, not densities: a hypothesis stands for all poses around it.
     """
     angle, length = rotation_angle_rad(T), float(np.sqrt(np.square(T[:3, 3]).sum()))
 

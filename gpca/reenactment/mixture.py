@@ -1,8 +1,7 @@
 """The likelihood of a pose: observed points are normal around the model's points, or outliers spread over a cube.
 
-The width of the normals and the share of outliers are estimated for each pose, so neither normals nor a noise level are
-needed. Expectation maximization moves the pose as ICP does, but each point is drawn to the mean of its partners,
-weighted by how probable they are (Granger & Pennec 2002; Myronenko & Song 2010).
+Width and share of outliers are estimated for each pose. Expectation maximization draws each point to the mean of its
+partners, weighted by how probable they are (Granger & Pennec 2002; Myronenko & Song 2010).
 """
 
 from dataclasses import dataclass
@@ -66,9 +65,8 @@ class Mixture:
     ) -> Fits:
         """Maximize the likelihood of the observed points (N, 3) from each pose (n, 4, 4), times that of an anchor.
 
-        A fit that has converged takes fewer iterations. Where poses are not moving, the width and the share of outliers
-        are estimated there. The normals are `width_n` wide at first, by default `FIRST_WIDTH`.
-        With the densities of the observed points (:func:`densities_of`), the model may lack surface.
+        Where poses are not moving, width and share of outliers alone are estimated. The normals are `width_n` wide at
+        first. With the densities of the observed points (:func:`densities_of`), the model may lack surface.
         """
         poses_n, n = np.array(T_n, np.float64), len(T_n)
         likelihood_n, outliers_n = np.empty((2, n))

@@ -52,15 +52,9 @@ def fit_all(
 ):  # fmt: skip
     """Maximize the likelihood of the observed points (N, 3) from every pose (n, 4, 4), in place.
 
-    Args:
-        moving: whether the poses move; else only the width and the share of outliers are estimated.
-        precision, arm: of the anchor (:class:`gpca.reenactment.mixture.Anchor`); 0 for none.
-        least: the smallest variance of the normals.
-        points: (3, M) in the order of their cells, see :class:`gpca.alignment.batched_icp.Target`.
-        densities: of the observed points (:func:`densities_among`); without rows, the model lacks no surface.
-        variance: (n,) of the normals at first, is replaced.
-        likelihood, outliers: (n,), are filled, as are matched and lone: (n, N), the probabilities of each point to lie
-            on the model's surface, and on surface that the model lacks.
+    Precision and arm are those of :class:`gpca.reenactment.mixture.Anchor`, 0 for none; `least` is the smallest
+    variance; points (3, M) are in the order of their cells; without rows of densities, the model lacks no surface.
+    Replaces the variance (n,); fills likelihood and outliers (n,), matched and lone (n, N) as :func:`_expect` says.
     """
     moments, room, near = np.empty((4, 4)), np.empty((8, 4)), np.empty_like(points)
     before = np.empty((4, 4))

@@ -1,7 +1,7 @@
 """Which part of a surface was observed: before a plane, what one side sees, or all but some patches.
 
-Points are observed everywhere in a region alike. So a region of a share s of the surface is 1/s times as likely as the
-whole for each observed point inside, and hardly for any outside; noise and gaps between points blur which are.
+A region of a share s of the surface is 1/s times as likely as the whole for each observed point inside, and hardly for
+any outside; noise and gaps between points blur which are.
 """
 
 from __future__ import annotations

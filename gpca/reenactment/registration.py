@@ -59,8 +59,7 @@ def pose_posterior(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return probable poses T_target_source (K, 4, 4), the best first, and their probabilities (K,).
 
-    With a prior, the initial pose is believed in as the settings say; without, it is not read. The search takes `unit`
-    for the diameter of the target.
+    Without a prior, the initial pose is not read. The search takes `unit` for the diameter of the target.
     """
     onto_center = rigid_motion(np.eye(3), pair.target.mean(axis=0) - pair.source.mean(axis=0))
     frame = Frame(pair, pair.T_target_source_init if prior else onto_center, unit)

@@ -1,8 +1,6 @@
-"""How many times too large what was observed is for the model.
+"""How many times too large what was observed is for the model, by Gauss-Newton steps of similarities.
 
-Registrations of similarities start at probable poses and several scales. Points go to the planes of their nearest model
-points by Gauss-Newton steps of seven parameters; far ones count less and less. A scale other than 1 is believed if its
-posterior is the larger one, as in the search for the pose; a density in the observed cloud's own unit pays for
+A scale other than 1 is believed if its posterior is the larger one; a density in the observed cloud's own unit pays for
 shrinking to a part of the model.
 """
 

@@ -30,33 +30,21 @@ def reenact_scans(
     """Return the re-enactments of every row; of the causes it reads what may be observed."""
 
     def world(pair: ObservedPair, row: int) -> list[Enactment]:
-        found_k = None if T_found_S is None else T_found_S[row]
-        return reenact_scan(pair, float(error_factor_S[row]), settings, truth, found_k)
+        surface = ModelSurface(pair.model)
+        before = transform(pair.T_init, pair.observed)
+        random = generator(*pair.axes, "hypotheses")
+        found_n = pair.T_runs @ inverse(pair.T_init)
+        if T_found_S is not None and len(T_found_S[row]):
+            found_n = np.concatenate([found_n, T_found_S[row]])
+        hypotheses = find_hypotheses(before, surface, found_n, settings, random)
+        scale, enactments = NoiseScale(surface, random), []
+        for hypothesis in hypotheses:
+            candidate = cropped(hypothesis, before, surface, scale)
+            errors = OverlapErrors(candidate.clean[candidate.seen], float(error_factor_S[row]))
+            enactments.append(enact(hypothesis, candidate, errors, pair.axes, truth, misses=True))
+        return enactments
 
     return reenact_all(causes, *(causes.registrations.axes or ("", None)), settings, truth, world)[0]
-
-
-def reenact_scan(
-    pair: ObservedPair,
-    error_factor: float,
-    settings: ReenactmentSettings,
-    truth: CauseSettings,
-    T_found_k: np.ndarray | None = None,
-) -> list[Enactment]:
-    """Find hypotheses of the true pose of a pair of scans and enact each, the most probable first."""
-    surface = ModelSurface(pair.model)
-    before = transform(pair.T_init, pair.observed)
-    random = generator(*pair.axes, "hypotheses")
-    found_n = pair.T_runs @ inverse(pair.T_init)
-    if T_found_k is not None and len(T_found_k):
-        found_n = np.concatenate([found_n, T_found_k])
-    hypotheses = find_hypotheses(before, surface, found_n, settings, random)
-    scale, enactments = NoiseScale(surface, random), []
-    for hypothesis in hypotheses:
-        candidate = cropped(hypothesis, before, surface, scale)
-        errors = OverlapErrors(candidate.clean[candidate.seen], error_factor)
-        enactments.append(enact(hypothesis, candidate, errors, pair.axes, truth, misses=True))
-    return enactments
 
 
 def cropped(hypothesis: Hypothesis, before: np.ndarray, surface: ModelSurface, scale: NoiseScale) -> ScanCandidate:

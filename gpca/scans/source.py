@@ -100,8 +100,6 @@ def npz_scenes(entry: ScanEntry, place: Path) -> Iterator[ScannedScene]:
         if len(set(names)) < len(names):
             raise InputError(path, f"array '{order}' names a cloud twice", NPZ_REMEDY)
         wanted = {f"{CLOUD}{name}": (f"N{name}", 3) for name in names}
-        if missing := [name for name in wanted if name not in members]:
-            raise InputError(path, f"array '{missing[0]}' is missing", NPZ_REMEDY)
         if more := [name for name in members if name.startswith(CLOUD) and name not in wanted]:
             raise InputError(path, f"array '{more[0]}' has no pose", NPZ_REMEDY)
         clouds = load_arrays(path, wanted, dict.fromkeys(wanted, REAL), remedy=NPZ_REMEDY)

@@ -31,7 +31,6 @@ def scenes(rooms: int, objects: int, views: int, development: bool) -> Iterator[
 
 
 def room(name: str, views: int) -> ScannedScene:
-    """Return a room of this name and its scans."""
     random = generator("virtual scans", name)
     extent_3 = random.uniform((3.5, 3.5, 2.4), (6.0, 5.0, 3.0))
     meshes = MeshScene(_furnished(extent_3, random))

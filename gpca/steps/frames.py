@@ -38,7 +38,7 @@ def scenes(job: Job) -> None:
     sections = dict(job.settings)
     datasets, role = sections.pop("datasets", None), sections.pop("role", EVALUATION)
     is_all = sections.pop("rendered", ALL_OBJECTS) == ALL_OBJECTS
-    settings = SceneSettings.from_dict(sections)
+    settings = read_settings(SceneSettings, sections)
     inputs = dataset.files_behind(datasets, job.data_dir, None) if datasets else []
     with record_provenance([job.out], inputs, job.settings, folders=True):
         if not datasets:
@@ -120,7 +120,7 @@ def frame_registrations(job: Job) -> None:
 
     of_registrations = dict(job.settings)
     own = {name: of_registrations.pop(name) for name in ("test_share", "occluders") if name in of_registrations}
-    settings = FrameSettings(**own, registration=RegistrationSettings.from_dict(of_registrations))
+    settings = FrameSettings(**own, registration=read_settings(RegistrationSettings, of_registrations))
     inputs, name = [job.instances, job.objects], job.get("name", job.source)
     with record_provenance([job.registrations, job.poses, job.timings], inputs, job.settings, seed=job.seed):
         made = make_frame_registrations(*_instances(job, name), job.source, job.seed, settings)

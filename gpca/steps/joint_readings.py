@@ -30,6 +30,7 @@ from gpca.pairs.shifted_sets import DISTANCES, ShiftedSets
 from gpca.pairs.synthesis import RegistrationSettings, make_registrations
 from gpca.process.progress import progress
 from gpca.seeds import seed_of_file
+from gpca.settings import read_settings
 from gpca.steps.readings.files import RunFiles, accuracies, diagnostics_of_scores, like_the_training, train_and_test
 from gpca.steps.readings.knobs import accuracies_of_magnitudes, runs_of
 from gpca.steps.readings.labels import NEW, passes_to
@@ -58,7 +59,7 @@ class ReadingSamples:
     @classmethod
     def load(cls, job: Job, sets: Path, seed: int, registrations: dict) -> ReadingSamples:
         """Read the sets, and make some of their pairs anew, by settings that have the severities of the sets."""
-        settings, axes = RegistrationSettings.from_dict(registrations), (job.source, seed)
+        settings, axes = read_settings(RegistrationSettings, registrations), (job.source, seed)
         few = replace(settings, train=0, test=min(job.section("sizes")["samples"], settings.test))
         pairs, _ = make_registrations(ObjectClouds.load(job.objects, job.source), *axes, few)
         return cls(ShiftedSets.load(sets, axes), pairs, axes)

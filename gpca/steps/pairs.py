@@ -15,6 +15,7 @@ from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.objects.canonical import ObjectClouds, write_objects
 from gpca.pairs.dataset import Registrations, read_embedding, read_instances_of
+from gpca.settings import read_settings
 
 EARLIER = ("earlier_seconds", "earlier_icp_seconds")  # spent before an explainer starts
 
@@ -34,7 +35,7 @@ def registrations(job: Job) -> None:
     """Perturb and align canonical clouds -> ``registrations/{source}/seed{seed}.npz``."""
     from gpca.pairs.synthesis import RegistrationSettings, make_registrations
 
-    settings = RegistrationSettings.from_dict(job.settings)
+    settings = read_settings(RegistrationSettings, job.settings)
     objects = ObjectClouds.load(job.objects, job.source)
     with record_provenance([job.registrations, job.timings], [job.objects], job.settings, seed=job.seed):
         registrations, icp_seconds_S = make_registrations(objects, job.source, job.seed, settings)

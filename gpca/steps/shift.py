@@ -23,7 +23,7 @@ from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.shifted_sets import SPACES, TRAINED_ON, ShiftedSets
 from gpca.pairs.synthesis import RegistrationSettings, make_registrations
 from gpca.process.progress import progress
-from gpca.settings import Bounds, Count, OpenShare
+from gpca.settings import Bounds, Count, OpenShare, read_settings
 
 PRINCIPAL_COMPONENTS = 16  # of embeddings, for their distances
 
@@ -46,7 +46,8 @@ class ShiftSettings:
         shift = dict(shift)
         samples = shift.get("samples", cls.samples)
         severities = shift.pop("severities", {})
-        beyond = RegistrationSettings.from_dict(registrations | {"severities": severities, "train": 0, "test": samples})
+        beyond = read_settings(RegistrationSettings, registrations | {"severities": severities})
+        beyond = replace(beyond, train=0, test=samples)
         trained = EncoderSettings(**encoder | shift.pop("encoder", {}))
         return cls(beyond=beyond, encoder=trained, **shift)
 

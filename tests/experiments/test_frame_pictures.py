@@ -59,18 +59,7 @@ def results(tiny, tmp_path_factory):
     )
     write_predictions(predictions, registrations, filled)
     write_metrics(collect([predictions]), folder / "metrics.csv")
-    from gpca.io.arrays import save_arrays
-
-    save_arrays(
-        folder / "objects.npz",
-        {
-            "names": np.array(objects.names),
-            "points_m": np.concatenate([points for points, _ in objects.clouds]),
-            "normals": np.concatenate([normals for _, normals in objects.clouds]),
-            "offsets": np.cumsum([0, *(len(points) for points, _ in objects.clouds)]),
-            "diameters_m": objects.diameters_m,
-        },
-    )
+    objects.save(folder / "objects.npz", "tiny")
     return folder
 
 

@@ -48,7 +48,8 @@ def files(clouds, tmp_path_factory):
     save_arrays(
         folder / "objects.npz",
         {"names": NAMES, "points_m": points_m, "normals": np.full_like(points_m, 3**-0.5)}
-        | {"offsets": np.array([0, 2000, 4000]), "diameters_m": DIAMETERS_M},
+        | {"offsets": np.array([0, 2000, 4000]), "diameters_m": DIAMETERS_M}
+        | {"families": NAMES, "folds": np.array([-1, -1])},
     )
     T_init, T_icp = rigid([0.1, 0, 0.2], [0.01, 0, 0.03]), rigid([0, 0.7, 0.1], [0, 0.1, 0])
     sources, aligned, severities, labels = [], [], [], []

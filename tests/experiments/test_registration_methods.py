@@ -67,8 +67,8 @@ def object_files(tmp_path, objects):
     paths = [tmp_path / f"objects/{source}.npz" for source in ("ycb", "cups")]
     for path in paths:
         path.parent.mkdir(exist_ok=True)
-        families = ("box", "round", "round")
-        dataclasses.replace(objects, families=families, folds=(0, 1, 1)).save(path, path.stem)
+        families = np.array(["box", "round", "round"])
+        dataclasses.replace(objects, families=families, folds=np.array([0, 1, 1])).save(path, path.stem)
     return paths
 
 

@@ -19,7 +19,7 @@ def models_in(scenes):
 
 def most_seen(instances, objects):
     """The instance of the bracket with most pixels, alone, started from the truth."""
-    sizes = np.diff(instances.offsets) * (instances.object_index == objects.names.index(f"tiny {BRACKET}"))
+    sizes = np.diff(instances.offsets) * (instances.object_index == objects.row(f"tiny {BRACKET}"))
     return only(instances, int(sizes.argmax()))
 
 

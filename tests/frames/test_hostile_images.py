@@ -37,8 +37,8 @@ def bomb(side, mode="I;16"):
 
 
 IMAGES = {
-    "depth of 8 bits": (DEPTH, lambda p: save(p, (FLAT / 30).astype(np.uint8)), "is 8-bit depth: 16 bits expected"),
-    "depth of colours": (DEPTH, lambda p: save(p, COLOURS), "is a color image, not depth"),
+    "depth of 8 bits": (DEPTH, lambda p: save(p, (FLAT / 30).astype(np.uint8)), "is color or 8-bit, not 16-bit depth"),
+    "depth of colours": (DEPTH, lambda p: save(p, COLOURS), "is color or 8-bit, not 16-bit depth"),
     "no depth anywhere": (DEPTH, lambda p: save(p, 0 * FLAT), "has no depth: every pixel is 0"),
     "NaN depth": (DEPTH, as_tiff(np.full(SHAPE, np.nan, np.float32)), "has no depth: every pixel is 0"),
     "negative depth": (DEPTH, as_tiff(np.full(SHAPE, -0.7, np.float32)), "contains negative or infinite depth"),

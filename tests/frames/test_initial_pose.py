@@ -38,10 +38,10 @@ def test_an_error_is_within_its_declared_size():
 
 def test_features_find_an_object_that_has_no_symmetry(tiny):
     instances, objects = tiny
-    index = objects.names.index("tiny bracket")
+    index = objects.row("tiny bracket")
     diameter_m = objects.diameters_m[index]
     settings = InitialPoseSettings(tries=10)
-    registration = GlobalRegistration(objects.points(index), objects.normals(index), diameter_m, settings)
+    registration = GlobalRegistration(objects.points(index), objects.normals_of(index), diameter_m, settings)
     rows = np.flatnonzero(instances.object_index == index)
     rows = rows[np.argsort(-np.diff(instances.offsets)[rows])][:2]  # the best seen
     found = [registration.register(instances.cloud_m(i), seed=1) for i in rows]

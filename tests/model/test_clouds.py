@@ -201,8 +201,8 @@ def shapes(four):
     from gpca.objects.canonical import canonical_cloud
 
     made = {
-        name: halves(points, diameter_m)
-        for name, diameter_m, (points, _) in zip(four.names, four.diameters_m, four.clouds, strict=True)
+        str(name): halves(four.points(i), diameter_m)
+        for i, (name, diameter_m) in enumerate(zip(four.names, four.diameters_m, strict=True))
     }
     for surface in surfaces("linemod"):
         if surface.name in ("cat", "iron", "duck", "can"):

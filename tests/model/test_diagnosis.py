@@ -38,7 +38,7 @@ def said(points, *poses):
 
 @pytest.fixture(scope="module")
 def drill(four):
-    index = four.names.index("035_power_drill")
+    index = four.row("035_power_drill")
     return four.points(index)[:600].astype(float) / four.diameters_m[index]
 
 

@@ -41,7 +41,7 @@ def test_a_free_direction_stands_in_the_state_of_a_right_result(shipped):
 
 @pytest.mark.parametrize("size", [1.3, 0.7])
 def test_a_wrong_scale_is_a_cause_and_the_advice_is_to_rescale(shipped, four, size):
-    points = np.random.default_rng(0).permutation(four.points(four.names.index("035_power_drill")).astype(float))
+    points = np.random.default_rng(0).permutation(four.points(four.row("035_power_drill")).astype(float))
     source, target, T_right = points[:1000], points[1000:2500], np.eye(4)
     center = source.mean(axis=0)
     said = shipped.explain(center + size * (source - center), target, T_right)

@@ -149,12 +149,12 @@ def test_written_objects_come_back(tmp_path, capsys):
     surfaces = [box(), view(), box("large", (1, 1, 1))]
     write_objects(surfaces, "s", path, n_points=128)
     clouds = ObjectClouds.load(path)
-    assert clouds.names == ("box", "view", "large")
+    assert clouds.names.tolist() == ["box", "view", "large"]
     assert len(clouds) == 3
     for i, surface in enumerate(surfaces):
         points_m, normals, diameter_m = canonical_cloud(surface, "s", 128)
         assert np.array_equal(clouds.points(i), points_m)
-        assert np.array_equal(clouds.normals(i), normals)
+        assert np.array_equal(clouds.normals_of(i), normals)
         assert clouds.diameters_m[i] == diameter_m
     assert "s: view: 400 points" in capsys.readouterr().err
 
@@ -165,7 +165,7 @@ def test_inconsistent_file_is_refused(tmp_path):
     arrays = dict(np.load(path))
     for offsets in ([0, 128], [0, 128, 500], [0, 600, 528], [1, 128, 528]):
         np.savez(path, **{**arrays, "offsets": np.array(offsets)})
-        with pytest.raises(InputError, match="do not match"):
+        with pytest.raises(InputError, match=r"do not match|fewer than 1|not 3"):
             ObjectClouds.load(path)
     with pytest.raises(InputError, match="no such file"):
         ObjectClouds.load(tmp_path / "other.npz")

@@ -299,7 +299,6 @@ MESHES = {
     # OBJ
     "index_0.obj": obj(faces=BALL.faces),
     "cut_between_faces.obj": obj(faces=BALL.faces[:160] + 1),
-    "counts_back.obj": obj(faces=BALL.faces - 162) + "v 1 2 3\n",
     "weights.obj": obj([f"1051 {row}" for row in VERTICES]),
     "zeros.obj": "\0" * 3_000_000,
     # STL
@@ -330,7 +329,7 @@ FAULTS = {
     "x_twice.ply": "declares property 'x' twice",
     "two_corners.ply": f"row 6 of {len(MESHES_FACES)} of element face has 2 corners",
     "two_corners_binary.ply": "element face has rows of 2 corners",
-    "two_numbers.stl": "line 4: 'vertex' has 2 numbers",
+    "two_numbers.stl": "it is neither whole facets from 'solid' to 'endsolid'",
     "zeros.obj": "a line is longer than 1048576 bytes, so it is not text",
 }
 

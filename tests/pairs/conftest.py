@@ -16,7 +16,7 @@ ICP = ICPSettings()
 @pytest.fixture(scope="session")
 def pair(four):
     """Of a power drill, registered perfectly from everywhere."""
-    index = four.names.index("035_power_drill")
+    index = four.row("035_power_drill")
     surface = four.points(index).astype(float) / four.diameters_m[index]
     still = np.tile(np.eye(4), (13, 1, 1))
     return ObservedPair(surface[:300], surface[300:600], np.eye(4), still, np.ones(13), np.full(13, 0.02), ("tiny",))

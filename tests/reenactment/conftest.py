@@ -29,7 +29,7 @@ def can(four):
 
 
 def surface_of(objects, name):
-    index = objects.names.index(name)
+    index = objects.row(name)
     return objects.points(index).astype(float) / objects.diameters_m[index]
 
 

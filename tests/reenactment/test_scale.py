@@ -10,7 +10,7 @@ from gpca.rigid import exp, inverse, transform
 
 @pytest.fixture(scope="module")
 def drill(four):
-    index = four.names.index("035_power_drill")
+    index = four.row("035_power_drill")
     return np.random.default_rng(0).permutation(four.points(index).astype(float) / four.diameters_m[index])
 
 

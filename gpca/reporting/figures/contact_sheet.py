@@ -42,7 +42,8 @@ def draw_contact_sheet(objects_npz: str | Path, title: str, dataset: str = "") -
         row, column = divmod(index, columns)
         first = 2 * column + columns - min(columns, count - row * columns)
         panel = figure.add_subplot(grid[row, first : first + 2])
-        panel.imshow(Solid.of(*objects.clouds[index], VIEW, round(tile_in * 300)).image, interpolation="antialiased")
+        solid = Solid.of(objects.points(index), objects.normals_of(index), VIEW, round(tile_in * 300))
+        panel.imshow(solid.image, interpolation="antialiased")
         panel.set_axis_off()
         write_below(panel, f"{name_lines}\n{diameter_m * 1000:.0f} mm", fontsize=size_pt, pad=-2)
     return figure

@@ -19,6 +19,7 @@ from gpca.pairs.shifted_sets import ShiftedSets
 from gpca.pairs.synthesis import RegistrationSettings, make_registrations
 from gpca.process.progress import progress
 from gpca.seeds import generator
+from gpca.settings import read_settings
 from gpca.steps.readings.files import Row, RunFiles, accuracies, accuracies_of_named, like_the_training, train_and_test
 from gpca.steps.readings.groups import Reading
 from gpca.steps.readings.learners import gpc_scores
@@ -78,7 +79,7 @@ def retrain(job: Job) -> None:
     checkpoint = job.out.with_suffix(".checkpoint")  # no output of the rule: a rerun continues from it
     with record_provenance([job.out], [job.objects], job.settings, seed=job.seed):
         objects = ObjectClouds.load(job.objects, job.source)
-        samples, _ = make_registrations(objects, *axes, RegistrationSettings.from_dict(parts["registrations"]))
+        samples, _ = make_registrations(objects, *axes, read_settings(RegistrationSettings, parts["registrations"]))
         model, _ = train_encoder(samples, *axes, encoder_settings, checkpoint)
         embed_own = embedding_by(model, job.seed, encoder_settings)
         samples = replace(samples, attached={"embedding": embed_own(samples, job.source)[0]})

@@ -11,7 +11,8 @@ from gpca.rigid import exp, inverse, transform
 def clouds(objects, index, seed=0, points=250):
     """Disjoint points of one object and their normals: source, target, source's normals, target's."""
     order = np.random.default_rng(seed).permutation(len(objects.points(index)))
-    all_points, all_normals = objects.points(index).astype(float) / objects.diameters_m[index], objects.normals(index)
+    all_points = objects.points(index).astype(float) / objects.diameters_m[index]
+    all_normals = objects.normals_of(index)
     source, target = order[:points], order[points : 2 * points]
     return all_points[source], all_points[target], all_normals[source].astype(float), all_normals[target].astype(float)
 

@@ -37,6 +37,8 @@ def _write_objects(path, names):
             "normals": np.concatenate([normals for _, normals in clouds]).astype(np.float32),
             "offsets": np.arange(len(names) + 1) * 200,
             "diameters_m": 0.1 * np.arange(1, len(names) + 1),
+            "families": np.array(names),
+            "folds": np.full(len(names), -1),
         },
     )
     return path

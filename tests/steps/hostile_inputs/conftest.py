@@ -18,12 +18,7 @@ def made(objects, registrations, tmp_path_factory):
     folder = tmp_path_factory.mktemp("made")
     random = np.random.default_rng(0)
     n = len(registrations)
-    points = {
-        key: np.concatenate([cloud[i] for cloud in objects.clouds]) for i, key in enumerate(("points_m", "normals"))
-    }
-    offsets = np.cumsum([0, *(len(cloud) for cloud, _ in objects.clouds)])
-    names = {"names": np.array(objects.names), "diameters_m": objects.diameters_m}
-    save_arrays(folder / "objects.npz", names | points | {"offsets": offsets}, ("tiny", None))
+    objects.save(folder / "objects.npz", "tiny")
     registrations.save(folder / "registrations.npz")
     of_samples = {"sample": registrations.sample, "split": registrations.split}
     embeddings = {"h": random.normal(size=(n, 8)), "head_logits": random.normal(size=(n, 3))}

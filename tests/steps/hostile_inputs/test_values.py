@@ -49,10 +49,10 @@ VALUES = {
     ("objects.npz", "two of one name", "the same name"): {"names": lambda n: n[[0, 0, 2]]},
     ("objects.npz", "names of numbers", "names"): {"names": lambda n: np.arange(len(n))},
     ("objects.npz", "offsets of halves", "offsets"): {"offsets": lambda o: o + 0.0},
-    ("objects.npz", "offsets that fall", "do not match"): {"offsets": lambda o: o[[0, 2, 1, 3]]},
-    ("objects.npz", "no objects", "do not match"): {
+    ("objects.npz", "offsets that fall", "fewer than 1"): {"offsets": lambda o: o[[0, 2, 1, 3]]},
+    ("objects.npz", "no objects", "has no samples"): {
         "names": lambda n: n[:0], "diameters_m": lambda d: d[:0], "offsets": lambda o: o[:1],
-        "points_m": lambda p: p[:0], "normals": lambda n: n[:0],
+        "families": lambda n: n[:0], "folds": lambda n: n[:0], "points_m": lambda p: p[:0], "normals": lambda n: n[:0],
     },
     # of registrations
     ("registrations.npz", "clouds in millimetres", "'points'"): {"points": lambda p: p * 1e6},
