@@ -9,8 +9,7 @@ import numpy as np
 
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.declarations import Experiment, Frame, Paths, Run, Tidy, table
-from gpca.evaluation.intervals import Clustered
-from gpca.evaluation.measures import ALL, Measure, by_value, over_seeds, read_all_metrics, read_samples
+from gpca.evaluation.measures import ALL, Clustered, Measure, by_value, over_seeds, read_all_metrics, read_samples
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.registry import explainer_entry
 from gpca.reporting.sheet import Cell, Column, Row, Sheet, crossed, over_clusters, show, where, with_label

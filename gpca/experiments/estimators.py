@@ -10,8 +10,7 @@ from gpca.alignment.methods.registry import method_module, methods, require_loca
 from gpca.causes.judged import ranking
 from gpca.declarations import ByName, Experiment, Frame, LeftOut, Names, Paths, Plan, Run, Series, Step, numbers
 from gpca.errors import InputError, with_key
-from gpca.evaluation.intervals import Clustered, interval
-from gpca.evaluation.measures import source_method_seed, tidy
+from gpca.evaluation.measures import Clustered, interval, source_method_seed, tidy
 from gpca.io import csv_file
 from gpca.settings import part_of
 from gpca.uncertainty.estimates import KINDS, REFERENCES, EstimatorPairSettings, read_estimate_files

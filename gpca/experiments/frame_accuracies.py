@@ -9,8 +9,7 @@ from gpca.attribution.diagnostics import brier_score, calibration_error, negativ
 from gpca.attribution.metrics import attribution_metrics
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.declarations import Frame, Paths, Run, numbers
-from gpca.evaluation.intervals import Clustered
-from gpca.evaluation.measures import ALL, intervals, source_method_seed, tidy
+from gpca.evaluation.measures import ALL, Clustered, intervals, source_method_seed, tidy
 from gpca.experiments.frame_labels import collect_labels
 from gpca.experiments.frames import TOGETHER, reduced_backbones
 from gpca.pairs.dataset import read_samples_of_frames

@@ -8,8 +8,7 @@ from typing import Any
 from gpca.attribution.predictions import read_predictions
 from gpca.declarations import Experiment, Figure, Frame, Paths, Run, Step, figure, numbers, table
 from gpca.errors import InputError
-from gpca.evaluation.intervals import Clustered
-from gpca.evaluation.measures import ALL, intervals, read_samples, tidy
+from gpca.evaluation.measures import ALL, Clustered, intervals, read_samples, tidy
 from gpca.io.csv_file import numbers as number_column
 from gpca.io.csv_file import read_numbers
 from gpca.reporting.figures.style import BLACK, BLUE, COLUMN_WIDTH_IN, GRAY, ORANGE

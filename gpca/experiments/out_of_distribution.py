@@ -12,8 +12,7 @@ from gpca.attribution import learner_predictions as predicted
 from gpca.declarations import ByName, Experiment, Frame, LeftOut, Names, Paths, Run, Step, numbers, table
 from gpca.encoders.registry import EncoderChanges, require_draws
 from gpca.errors import InputError
-from gpca.evaluation.intervals import Clustered
-from gpca.evaluation.measures import ALL, intervals, tidy
+from gpca.evaluation.measures import ALL, Clustered, intervals, tidy
 from gpca.experiments.explained import explainer_settings, require_explained
 from gpca.explainers.registry import explainer_entry, explainer_module, explainers
 from gpca.pairs.perturbation import Severities

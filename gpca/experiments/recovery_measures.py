@@ -7,8 +7,7 @@ import numpy as np
 
 from gpca.causes.policy import NOTHING, QUEUE
 from gpca.declarations import Frame, Paths, Run, Series, numbers
-from gpca.evaluation.intervals import Clustered
-from gpca.evaluation.measures import ALL, Measure, by_value, intervals, over_seeds, tidy
+from gpca.evaluation.measures import ALL, Clustered, Measure, by_value, intervals, over_seeds, tidy
 from gpca.io.csv_file import numbers as number_column
 from gpca.io.csv_file import read_csv
 from gpca.pairs.perturbation import CONCEPTS

@@ -14,8 +14,7 @@ from gpca.alignment.pose_error import SuccessSettings, success_within
 from gpca.declarations import ByName, Experiment, Frame, LeftOut, Names, Paths, Plan, Run, Step, numbers, table
 from gpca.errors import InputError, require_names, with_key
 from gpca.evaluation import measures as evaluated
-from gpca.evaluation.intervals import Clustered, weighted_mean
-from gpca.evaluation.measures import ALL, SHARE, Measure
+from gpca.evaluation.measures import ALL, SHARE, Clustered, Measure, weighted_mean
 from gpca.io.csv_file import numbers as number_column
 from gpca.io.csv_file import read_csv, read_numbers
 from gpca.objects.canonical import ObjectClouds

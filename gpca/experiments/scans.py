@@ -15,8 +15,7 @@ from gpca.alignment.methods.registry import installed, method_entry, method_modu
 from gpca.declarations import Experiment, Frame, LeftOut, Names, Paths, Run, numbers, plain, table
 from gpca.declarations.step import Plan, Step, Wildcards
 from gpca.errors import InputError, require_names, with_key
-from gpca.evaluation.intervals import Clustered
-from gpca.evaluation.measures import ALL, Measure, Parts, over_seeds, read_samples
+from gpca.evaluation.measures import ALL, Clustered, Measure, Parts, over_seeds, read_samples
 from gpca.experiments.registration_methods import method_rows, missing_methods, read_seconds, row_name
 from gpca.io.csv_file import read_numbers
 from gpca.objects.entry import Name, title_of

@@ -11,8 +11,7 @@ from gpca.attribution.predictions import read_predictions
 from gpca.declarations import EXPLAINERS, ByName, Experiment, Frame, LeftOut, Paths, Run, numbers, table
 from gpca.declarations.step import Plan, Step, Wildcards
 from gpca.errors import with_key
-from gpca.evaluation.intervals import Clustered
-from gpca.evaluation.measures import ALL, POOLED, Measure, by_value, over_seeds, per_seed, read_samples
+from gpca.evaluation.measures import ALL, POOLED, Clustered, Measure, by_value, over_seeds, per_seed, read_samples
 from gpca.experiments.explained import explainer_settings, require_explained
 from gpca.experiments.registration_methods import missing_methods
 from gpca.explainers.registry import explainer_entry, explainer_module
