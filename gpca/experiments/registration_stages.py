@@ -72,7 +72,7 @@ class Staged:
             uncertain = rows[named & (self.u_S > self.u_clean)]
             if len(failures := uncertain[[self.state(row) == FAILED for row in uncertain.index]]):
                 return _median(failures, other)
-        test = self.predictions[(self.predictions["split"] == "test") & (self.predictions["concept_true"] == concept)]
+        test = rows[(rows["split"] == "test") & (rows["concept_true"] == concept)]
         if test.empty:
             raise InputError(path, f"has no test sample of '{concept}'", "raise registrations.test")
         right = test[test["concept_predicted"] == concept]

@@ -151,11 +151,11 @@ def collect(run: Run, prediction_files: Paths, causes_files: Paths, shifted_file
             require_same_samples(path, rows, truth.registrations.arrays, "causes", ("sample",))
             judged.setdefault(str(explainer), {})[shift, source, seed] = judged_by(rows, truth, seed)
     order = list(dict.fromkeys(shift for shift, _, _ in truths))
-    return intervals(measured({name: _by_shift(each, order) for name, each in judged.items()}), "shifts")
-
-
-def _by_shift(judged: Mapping[tuple[str, str, int], Judged], order: list[str]) -> dict[str, Judged]:
-    return {shift: joined(judged[key] for key in sorted(judged) if key[0] == shift) for shift in order}
+    by_shift = {
+        name: {shift: joined(each[key] for key in sorted(each) if key[0] == shift) for shift in order}
+        for name, each in judged.items()
+    }
+    return intervals(measured(by_shift), "shifts")
 
 
 def measured(judged: Mapping[str, Mapping[str, Judged]]) -> list[tuple]:

@@ -56,9 +56,7 @@ def coverage_risk(run: Run, learned: Mapping) -> Figure:
                 risks.append(100 * np.interp(COVERAGES, kept_S / len(rows), np.cumsum(wrong_S) / kept_S))
             if risks:
                 mean, low, high = np.array([mean_interval(risk_R) for risk_R in np.transpose(risks)]).T
-                panel.plot(100 * COVERAGES, mean, **_look(learner))
-                band = {"color": _look(learner)["color"], "alpha": 0.15, "linewidth": 0}
-                panel.fill_between(100 * COVERAGES, np.maximum(low, 0), np.minimum(high, 100), **band)
+                _draw_line(panel, learner, 100 * COVERAGES, mean, np.maximum(low, 0), np.minimum(high, 100))
                 highest = max(highest, float(mean[COVERAGES >= ENOUGH].max()))
         drawn = panel.get_lines()
         if drawn and not any(curve.get_ydata().any() for curve in drawn):
@@ -128,9 +126,7 @@ def uncertainty_vs_distance(run: Run, learned: Mapping) -> Figure:
                 seeds = [sets[name] for key, sets in parts.items() if key[:2] == (source, learner) and name in sets]
                 if seeds:
                     distance, mean, half = distance_curve(seeds)
-                    panel.plot(distance, mean, **_look(learner))
-                    band = {"color": _look(learner)["color"], "alpha": 0.15, "linewidth": 0}
-                    panel.fill_between(distance, np.maximum(mean - half, 0), mean + half, **band)
+                    _draw_line(panel, learner, distance, mean, np.maximum(mean - half, 0), mean + half)
                     samples = sum(map(len, seeds))
             panel.text(0.03, 0.96, f"$n$ = {samples}", transform=panel.transAxes, va="top", fontsize=style.SMALL_PT)
         axes[row, 0].set_ylabel(f"{SETS[name]}\n1 - largest score", fontsize=style.SMALL_PT)
@@ -169,10 +165,13 @@ def distance_curve(seeds: Sequence) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def _look(learner: str) -> dict[str, Any]:
-    """Color, line and width of a learner."""
-    return dict(
-        zip(("color", "linestyle", "linewidth"), style.METHOD_LOOKS.get(learner, style.OTHER_LOOK), strict=True)
-    )
+    look = style.METHOD_LOOKS.get(learner, style.OTHER_LOOK)
+    return dict(zip(("color", "linestyle", "linewidth"), look, strict=True))
+
+
+def _draw_line(panel, learner: str, x: np.ndarray, y: np.ndarray, low: np.ndarray, high: np.ndarray) -> None:
+    panel.plot(x, y, **_look(learner))
+    panel.fill_between(x, low, high, color=_look(learner)["color"], alpha=0.15, linewidth=0)
 
 
 def _write_legend(drawing: Figure, shown: Mapping[str, str]) -> None:

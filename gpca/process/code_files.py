@@ -12,6 +12,7 @@ BESIDE = {  # files that a module reads from its folder
     "gpca.comparison.claims": "claims.yaml",
     "gpca.comparison.published": "*.csv",
     "gpca.reporting.figures.style": "matplotlibrc",
+    "gpca.experiments.reading_words": "reading_words.csv",
     "gpca.experiments.scans": "published_scans.csv",
     "gpca.page.page": "templates/*",
     "gpca.model.scene": "assets/*",
