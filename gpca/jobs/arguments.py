@@ -2,7 +2,7 @@
 
 import argparse
 from collections.abc import Callable
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from gpca.errors import InputError
 from gpca.io.files import is_name
@@ -29,25 +29,21 @@ class OneLineParser(argparse.ArgumentParser):
 
 def whole_number(least: int, most: int) -> Callable[[str], int]:
     """Return the type of an option with a whole number from `least` to `most`."""
-
-    def read(text: str) -> int:
-        try:
-            return whole(text, least, most)
-        except ValueError as fault:  # argparse shows only the text of its own error
-            raise argparse.ArgumentTypeError(str(fault)) from fault
-
-    return read
+    return lambda text: _read(whole, text, least, most)
 
 
 def length(text: str) -> float:
     """Read a positive length in the unit of the clouds."""
-    try:
-        value = decimal(text)
-    except ValueError as fault:
-        raise argparse.ArgumentTypeError(str(fault)) from fault
-    if value <= 0:
+    if (value := _read(decimal, text)) <= 0:
         raise argparse.ArgumentTypeError(f"{value:g} is no length; give a positive one")
     return value
+
+
+def _read(read: Callable[..., Any], text: str, *limits: int) -> Any:
+    try:
+        return read(text, *limits)
+    except ValueError as fault:  # argparse shows only the text of its own error
+        raise argparse.ArgumentTypeError(str(fault)) from fault
 
 
 THREADS = whole_number(1, 256)  # OpenMP and numba crash where they cannot start as many as asked, some thousands

@@ -1,7 +1,6 @@
 """Estimates the time left of a run, beside Snakemake's count of jobs.
 
-The expected time of a job is that of its benchmark file from an earlier run in the same folder, else the mean of its
-rule in a measured run (`TIMES`), else the mean of all other jobs.
+The expected time of a job is the mean of its rule in a measured run (`TIMES`), else the mean of all other jobs.
 """
 
 import csv
@@ -17,7 +16,6 @@ TIMES = Path(__file__).parents[2] / "workflow/measured_times.csv"  # python benc
 USUAL_RUN = "default"  # gives the relative times for a run that was never measured
 EVERY_S = 20.0  # between two lines
 TRUST_S = 120.0  # core time after which the speeds of this and the measured machine have equal weight
-_PROGRESS = "progress"  # Snakemake's event of its count of jobs
 
 
 class TimeLeft(logging.Handler):
@@ -25,7 +23,7 @@ class TimeLeft(logging.Handler):
 
     def __init__(
         self,
-        expected: Mapping[str, float | None],
+        expected: Mapping[str, float],
         cores: int,
         has_ended: Callable[[str], bool],
         say: Callable[[str], object],
@@ -33,18 +31,9 @@ class TimeLeft(logging.Handler):
         clock: Callable[[], float] = monotonic,
     ) -> None:
         super().__init__(logging.INFO)
-        usual_s = fmean([seconds for seconds in expected.values() if seconds is not None])
-        self._left = {job: usual_s if seconds is None else seconds for job, seconds in expected.items()}
-        self._cores, self._has_ended, self._say, self._clock = cores, has_ended, say, clock
+        self._left, self._cores, self._has_ended, self._say, self._clock = dict(expected), cores, has_ended, say, clock
         self._expected_s = self._took_s = trust_s
         self._reported_s = clock()
-
-    def finish(self, job: str, took_s: float | None) -> None:
-        """Note that a job has ended, and the seconds that it took, if known."""
-        expected_s = self._left.pop(job)
-        if took_s is not None:
-            self._expected_s += expected_s
-            self._took_s += took_s
 
     def seconds(self) -> float:
         """Return the expected seconds of the work per core, or the longest job, at the speed so far."""
@@ -53,11 +42,14 @@ class TimeLeft(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Handle a message of Snakemake; all but its counts of jobs are ignored."""
-        if getattr(record, "event", None) != _PROGRESS or self._clock() - self._reported_s < EVERY_S:
+        if getattr(record, "event", None) != "progress" or self._clock() - self._reported_s < EVERY_S:
             return
         self._reported_s = self._clock()
         for job in [*filter(self._has_ended, self._left)]:
-            self.finish(job, seconds_of(job))
+            expected_s, took_s = self._left.pop(job), seconds_of(job)
+            if took_s is not None:
+                self._expected_s += expected_s
+                self._took_s += took_s
         self._say(in_words(self.seconds()))
 
 
@@ -69,18 +61,16 @@ def tell_time_left(workflow: Any, run: str) -> None:
     times = read_times(TIMES)
     by_rule = times.get(run, times.get(USUAL_RUN, {}))
     jobs = {str(job.benchmark): job for job in workflow.dag.needrun_jobs() if job.benchmark}
-    before = {path: seconds_of(path) for path in jobs}
-    usual = {path: by_rule.get(job.rule.name) for path, job in jobs.items()}
-    expected = {path: usual[path] if before[path] is None else before[path] for path in jobs}
-    if not any(expected.values()):
+    known = {path: by_rule[job.rule.name] for path, job in jobs.items() if job.rule.name in by_rule}
+    if not known:
         return
+    expected = dict.fromkeys(jobs, fmean(known.values())) | known
     side_by_side = workflow.cores if workflow.local_exec else workflow.nodes
-    measured = run in times or any(before.values())
     cores = max(1, min(int(side_by_side or 1), len(jobs)))
     say = partial(logger.info, extra={"quietness": Quietness.PROGRESS})
-    trust_s = TRUST_S if measured else 1.0
+    trust_s = TRUST_S if run in times else 1.0
     time_left = TimeLeft(expected, cores, lambda path: workflow.dag.finished(jobs[path]), say, trust_s)
-    if measured:
+    if run in times:
         say(in_words(time_left.seconds()))
     logger.addHandler(time_left)
 

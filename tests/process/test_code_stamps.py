@@ -3,8 +3,7 @@ import os
 import pytest
 
 from gpca.process import code_files as files_of_code
-from gpca.process import code_stamps
-from gpca.process.code_stamps import code_stamp
+from gpca.process.code_files import code_stamp
 
 
 @pytest.fixture
@@ -18,7 +17,7 @@ def stamp(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
     def forget():
-        for cached in (files_of_code._imports, files_of_code._file, code_stamps._sha256, code_stamp):
+        for cached in (files_of_code._imports, files_of_code._file, files_of_code._sha256, code_stamp):
             cached.cache_clear()
 
     def fresh(*modules):

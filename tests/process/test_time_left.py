@@ -18,22 +18,20 @@ def count_of_jobs():
 
 
 def test_the_time_left_is_the_work_for_each_core_or_the_longest_job():
-    left = TimeLeft({"a": 30.0, "b": 60.0, "c": None}, 2, bool, print)
-    assert left.seconds() == pytest.approx((30 + 60 + 45) / 2)  # nobody knows of c, so it is as the others are
-    left.finish("a", None)
-    left.finish("c", None)
-    assert left.seconds() == 60
-    left.finish("b", None)
-    assert left.seconds() == 0
+    assert TimeLeft({"a": 30.0, "b": 60.0, "c": 45.0}, 2, bool, print).seconds() == pytest.approx((30 + 60 + 45) / 2)
+    assert TimeLeft({"b": 60.0, "c": 45.0}, 2, bool, print).seconds() == 60
+    assert TimeLeft({}, 2, bool, print).seconds() == 0
 
 
-def test_jobs_that_have_ended_correct_what_is_expected_of_the_others():
-    left = TimeLeft({"a": 120.0, "b": 120.0}, 1, bool, print, trust_s=120.0)
-    left.finish("a", 240.0)
-    assert left.seconds() == pytest.approx(120 * 360 / 240)
-    other = TimeLeft({"a": 120.0, "b": 120.0}, 1, bool, print, trust_s=1e-9)
-    other.finish("a", 240.0)
-    assert other.seconds() == pytest.approx(240)
+@pytest.mark.parametrize(("trust_s", "seconds"), [(120.0, 120 * 360 / 240), (1e-9, 240.0)])
+def test_jobs_that_have_ended_correct_what_is_expected_of_the_others(tmp_path, trust_s, seconds):
+    ended, now = tmp_path / "a.tsv", [0.0]
+    ended.write_text(f"{HEADER}240\t0:04:00\t100.0\n")
+    jobs, end = {str(ended): 120.0, "b": 120.0}, str(ended).__eq__
+    left = TimeLeft(jobs, 1, end, print, trust_s=trust_s, clock=lambda: now[0])
+    now[0] = 30.0
+    left.emit(count_of_jobs())
+    assert left.seconds() == pytest.approx(seconds)
 
 
 def test_a_line_follows_a_count_of_jobs_but_not_each():
@@ -59,9 +57,7 @@ def begun(tmp_path, monkeypatch):
     benchmarks = [tmp_path / "objects.tsv", tmp_path / "page.tsv"]
     jobs = [SimpleNamespace(benchmark=path, rule=SimpleNamespace(name=path.stem)) for path in benchmarks]
 
-    def begin(run, seconds=""):
-        if seconds:
-            benchmarks[1].write_text(f"{HEADER}{seconds}\t0:00:30\t100.0\n")
+    def begin(run):
         dag = SimpleNamespace(needrun_jobs=lambda: jobs, finished=lambda job: False)
         lines, handlers = [], list(logger.handlers)
         monkeypatch.setattr("snakemake.logging.logger.info", lambda line, extra: lines.append(line))
@@ -74,16 +70,11 @@ def begun(tmp_path, monkeypatch):
     return begin
 
 
-def test_a_run_begins_with_the_time_that_the_same_jobs_took_before(begun):
+def test_a_run_begins_with_the_time_that_its_rules_took_and_says_nothing_where_none_was_measured(begun):
     assert begun("default") == (["about 10 minutes left"], 1)
-    assert begun("default", "1800") == (["about 30 minutes left"], 1)
-
-
-def test_a_run_that_was_never_measured_waits_for_its_own_jobs_and_says_nothing_without_any_times(begun, monkeypatch):
     assert begun("my_run") == ([], 1)
     time_left.TIMES.unlink()
     assert begun("default") == ([], 0)
-    assert begun("my_run", "60") == (["about 1 minute left"], 1)
 
 
 @pytest.mark.parametrize("text", ["", HEADER, "h:m:s\n0:00:30\n", HEADER + "-\t-\t-\n"])

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.kills import results, temporary_folders
-from gpca.process.code_stamps import FOLDER
+from gpca.process.code_files import FOLDER
 
 from . import forks
 

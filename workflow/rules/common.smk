@@ -7,7 +7,7 @@ from gpca.experiments.claims import compared_sources
 from gpca.explainers.interface import BARE, REENACTED
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module
 from gpca.alignment.methods.registry import method_module
-from gpca.process.code_stamps import code_stamp
+from gpca.process.code_files import code_stamp
 from gpca.encoders.registry import encoders
 from gpca.objects.source import find_file
 from gpca.experiments.frames import pretraining_of
