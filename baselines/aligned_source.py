@@ -1,11 +1,13 @@
-"""Rivals of GP-CA that read the embedding of the aligned source alone, as it does in the paper."""
+"""GP-CA by other code and for causes, and its rivals that read the embedding of the aligned source alone."""
 
 from functools import partial
 
 import numpy as np
 
+from gpca.classifier.settings import GPCArguments
 from gpca.errors import InputError
 from gpca.explainers.classifiers import known_concepts
+from gpca.explainers.gpca import GPCA
 from gpca.explainers.interface import ExplainerEntry, ScoringExplainer, attached, for_causes
 from gpca.pairs.dataset import Registrations
 from gpca.settings import Positive
@@ -58,12 +60,24 @@ class SoftmaxHead(ScoringExplainer):
         return softmax(attached(registrations, "head_logits"), axis=1)
 
 
+class GpytorchGPCA(GPCA):
+    """GP-CA in gpytorch's own classes, a check: it agrees with ``gpca_paper`` within rounding."""
+
+    def __init__(self, source: str, seed: int, **settings: GPCArguments) -> None:
+        from gpca.classifier.gpytorch_classes import GpytorchGPC
+        from gpca.classifier.settings import GPCSettings
+
+        self._gpc = GpytorchGPC(self.labels, GPCSettings(**settings), source, seed)
+
+
 _entry = partial(ExplainerEntry, sees=("source",), reads="embeddings")
 EXPLAINERS = {
+    "gpca_gpytorch": _entry("GP-CA (gpytorch's classes)", GpytorchGPCA),
     "concept_vectors": _entry("Concept activation vectors", ConceptVectors),
     "softmax_head": _entry("Softmax head", SoftmaxHead),
 }
 CAUSE_EXPLAINERS = {
+    "gpca": _entry("GP-CA (aligned source)", for_causes(GPCA)),
     "softmax_head": _entry("Softmax head (aligned source)", for_causes(SoftmaxHead)),
     "concept_vectors": _entry("Concept activation vectors", for_causes(ConceptVectors)),
 }

@@ -65,25 +65,22 @@ def regression(
     return DescriptorClassifier(standardized_regression(inverse_regularisation), sees, wanted)
 
 
-def randomized_trees(source: str, seed: int, trees: int = 300, smallest_leaf: int = 2):
+def randomized_trees(source: str, seed: int, trees: int = 300):
     """Return an unfitted forest of extremely randomized trees (Geurts et al. 2006)."""
     from sklearn.ensemble import ExtraTreesClassifier
 
     random_state = seed_of(source, seed, "randomised trees") % 2**32
-    return ExtraTreesClassifier(trees, min_samples_leaf=smallest_leaf, max_features=0.3, random_state=random_state)
+    return ExtraTreesClassifier(trees, min_samples_leaf=2, max_features=0.3, random_state=random_state)
 
 
-def forest(
-    wanted: Columns, sees: Sees, source: str, seed: int, trees: Count = 300, smallest_leaf: Count = 2
-) -> DescriptorClassifier:
-    return DescriptorClassifier(randomized_trees(source, seed, trees, smallest_leaf), sees, wanted)
+def forest(wanted: Columns, sees: Sees, source: str, seed: int, trees: Count = 300) -> DescriptorClassifier:
+    return DescriptorClassifier(randomized_trees(source, seed, trees), sees, wanted)
 
 
 def boosting(
     sees: Sees, source: str, seed: int, iterations: Count = 150, learning_rate: LearningRate = 0.06
 ) -> DescriptorClassifier:
-    classifier = boosted_trees(source, seed, iterations=iterations, learning_rate=learning_rate)
-    return DescriptorClassifier(classifier, sees)
+    return DescriptorClassifier(boosted_trees(source, seed, iterations=iterations, learning_rate=learning_rate), sees)
 
 
 class CausePairGPCA(DescriptorGPCA):

@@ -19,7 +19,7 @@ from gpca.explainers.gpca import GPCA
 from gpca.explainers.interface import ExplainerEntry, Sees
 from gpca.pairs.dataset import Registrations
 from gpca.seeds import generator
-from gpca.settings import Count, PositiveShare
+from gpca.settings import Count
 
 if TYPE_CHECKING:
     import torch
@@ -39,15 +39,12 @@ class LearnedPairGPCA(PairDescription, GPCA):
         points: DescribedPoints = 512,
         draw_points: DescribedPoints = 96,
         epochs: Count = 6,
-        encoder_learning_rate: PositiveShare = 4e-3,
         **settings: GPCArguments,
     ) -> None:
         motion = "motion" in sees
         PairDescription.__init__(self, source, seed, "relations", points, motion)
         GPCA.__init__(self, source, seed, **settings)
-        self._sees = sees
-        self._training: dict[str, Any] = {"epochs": epochs, "learning_rate": encoder_learning_rate}
-        self._draw_points = min(draw_points, points)
+        self._sees, self._epochs, self._draw_points = sees, epochs, min(draw_points, points)
         self._embedding = f"{self._prefix}embedding_by_{ENCODER}" + ("" if motion else "_without_motion")
         self._embed: Callable[[Registrations], Registrations] | None = None
 
@@ -65,7 +62,7 @@ class LearnedPairGPCA(PairDescription, GPCA):
 
         labeled = seen(registrations)
         options: dict[str, Any] = {"motion": labeled.attached[motion].shape[1]}
-        settings = EncoderSettings(ENCODER, self._draw_points, draws=2, options=options, **self._training)
+        settings = EncoderSettings(ENCODER, self._draw_points, draws=2, epochs=self._epochs, options=options)
         draw = partial(draw_pairs, self._prefix + "points", motion)
         make = partial(PairDGCNN, **options)
         all_rows = replace(labeled, split=np.full(len(labeled), "train"))

@@ -85,8 +85,7 @@ def area_under_curve(curve: Frame) -> float:
 def stream_metrics(curve: Frame) -> dict[str, float]:
     """Return the metrics of one stream.
 
-    The delay is the number of arrivals from the first row with samples of the new concept until its accuracy reaches
-    `RECOGNIZED`; if it never does, until the end, a lower bound.
+    The delay is from the first row with samples of the new concept until its accuracy reaches `RECOGNIZED`, or the end.
     """
     hits = (curve["present"] == 1) & (curve["accuracy_new"] >= RECOGNIZED)
     first = int(hits.argmax()) if hits.any() else len(curve) - 1

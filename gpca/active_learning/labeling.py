@@ -17,7 +17,6 @@ from gpca.errors import InputError, refusing
 from gpca.io.arrays import TEXT, WHOLE, write_arrays
 from gpca.io.container import Container, array
 from gpca.io.files import append_row, printable, require_file, whole_file
-from gpca.numerals import whole
 from gpca.pairs.dataset import ragged
 from gpca.seeds import generator
 
@@ -110,16 +109,13 @@ class LabelFile:
             raise InputError(self.path, f"column '{missing[0]}' is missing", remedy)
         if head != [*LABEL_COLUMNS]:
             raise InputError(self.path, f"has the columns {','.join(head)[:80]}", f"give {','.join(LABEL_COLUMNS)}")
+        known = {(str(number), split): (split, number) for split, number in samples}
         for line, row in enumerate(rows, start=2):
             where = f"{self.path}, line {line}"
             if len(row) != len(LABEL_COLUMNS):
                 raise InputError(where, f"has {len(row)} entries, not {len(LABEL_COLUMNS)}", remedy)
             sample, split, concept = row
-            try:
-                key = (split, whole(sample))
-            except ValueError:
-                key = (split, -1)
-            if key not in samples:
+            if (key := known.get((sample, split))) is None:
                 raise InputError(where, f"no sample {sample[:40]!r} of split {split[:40]!r}", "remove the line")
             concept = concept.strip()
             if concept != SKIPPED:

@@ -1,9 +1,7 @@
 """Settings of active learning, without torch."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, Self
 
 from gpca.classifier.settings import GPCSettings
 from gpca.pairs.perturbation import Concept
@@ -23,7 +21,7 @@ class ActiveLearningSettings:
     gpc: GPCSettings = field(default_factory=lambda: GPCSettings(learning_rate=0.1))
 
     @classmethod
-    def from_dict(cls, section: dict) -> ActiveLearningSettings:
+    def from_dict(cls, section: dict) -> Self:
         """Build from the config's section ``active_learning``, which also has other keys."""
         fields = fields_of(section, cls)
         return cls(**fields | ({"gpc": GPCSettings(**fields["gpc"])} if "gpc" in fields else {}))

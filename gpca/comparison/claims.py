@@ -135,13 +135,13 @@ def judge(
             records.append(fields | uncompared | {"verdict": NOT_RUN, "claim_verdict": NOT_RUN})
             continue
         rows, strict_verdicts = [], []
-        strict = 1 - (1 - LEVEL) / len(claim.compared)
+        levels = LEVEL, 1 - (1 - LEVEL) / len(claim.compared)
         for compared in claim.compared:
             counterparts = compared.counterparts
             row: dict[str, Any] = {"source": counterparts[0].sources[0], "table": counterparts[0].table}
             row |= {"at_floor": False, "one": _name(compared.one, compared), "other": _name(compared.other, compared)}
-            verdict = strict_verdict = NOT_RUN
-            difference = difference_of(claim, compared, results, clusters, (LEVEL, strict), floors.get(claim.unit))
+            verdicts = [NOT_RUN, NOT_RUN]  # by these levels
+            difference = difference_of(claim, compared, results, clusters, levels, floors.get(claim.unit))
             if difference is not None:
                 shown = (difference.value, *difference.bounds[LEVEL])
                 for name, number in zip(("value", "low", "high"), shown, strict=True):
@@ -149,22 +149,20 @@ def judge(
                 row |= {"n": difference.n, "at_floor": difference.at_floor}
                 sources = (each.sources[0] for each in counterparts)
                 if any(objects[source]["stand_in"] for source in sources if source in objects):
-                    verdict = strict_verdict = NOT_COMPARABLE
+                    verdicts = [NOT_COMPARABLE] * 2
                 elif difference.at_floor:
-                    verdict = strict_verdict = INCONCLUSIVE
+                    verdicts = [INCONCLUSIVE] * 2
                 else:
                     censored = difference.at_least, difference.at_most
-                    verdict, strict_verdict = (
-                        verdict_of_interval(claim, *difference.bounds[level], *censored) for level in (LEVEL, strict)
-                    )
-            rows.append(fields | row | {"verdict": verdict})
-            strict_verdicts.append(strict_verdict)
-        verdicts = {row["verdict"] for row in rows}
-        if judged := verdicts - {NOT_RUN, NOT_COMPARABLE}:
+                    verdicts = [verdict_of_interval(claim, *difference.bounds[level], *censored) for level in levels]
+            rows.append(fields | row | {"verdict": verdicts[0]})
+            strict_verdicts.append(verdicts[1])
+        found = {row["verdict"] for row in rows}
+        if judged := found - {NOT_RUN, NOT_COMPARABLE}:
             against = (verdict for verdict in (REFUTED, SMALLER) if verdict in strict_verdicts)
             claim_verdict = next(against, SUPPORTED if judged == {SUPPORTED} else INCONCLUSIVE)
         else:
-            claim_verdict = NOT_COMPARABLE if NOT_COMPARABLE in verdicts else NOT_RUN
+            claim_verdict = NOT_COMPARABLE if NOT_COMPARABLE in found else NOT_RUN
         records += [row | {"claim_verdict": claim_verdict} for row in rows]
     return pd.DataFrame(records, columns=list(CLAIM_COLUMNS)).astype({"n": "Int64"})
 

@@ -1,8 +1,7 @@
 """Compares a run's CSV files with a reference run's: identical, within rounding, or different.
 
-Other libraries, or a processor below the common level, round otherwise, and a trained encoder then decides some samples
-otherwise. If two runs differ on a sample with probability d, the difference of two shares of n samples has the standard
-deviation √(d / n), which bounds the allowed difference (docs/comparison.md).
+Where libraries round otherwise, a trained encoder decides some samples otherwise. If two runs differ on a sample with
+probability d, shares of n samples differ with the standard deviation √(d / n) (docs/comparison.md).
 """
 
 import math

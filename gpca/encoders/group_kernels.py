@@ -66,20 +66,13 @@ def ball_query(points, centers, radius, k):
     return neighbors, counts
 
 
-@njit(cache=True)
 def distinct_edges(neighbors, counts, n_points):
     """Return point (E,), the row of each edge's point in all clouds; weight (E,), the slots it fills; ends (G + 1,)."""
-    batch, n_groups, k = neighbors.shape
-    ends = np.zeros(batch * n_groups + 1, np.int64)
-    ends[1:] = np.cumsum(counts.reshape(-1))
-    point = np.empty(ends[-1], np.int64)
-    weight = np.ones(ends[-1], np.float32)
-    for b in range(batch):
-        for m in range(n_groups):
-            g = b * n_groups + m
-            weight[ends[g]] += k - counts[b, m]  # the first point fills the remaining slots
-            for slot in range(counts[b, m]):
-                point[ends[g] + slot] = b * n_points + neighbors[b, m, slot]
+    batch, _, k = neighbors.shape
+    ends = np.append(0, np.cumsum(counts, dtype=np.int64))
+    rows = neighbors + n_points * np.arange(batch)[:, None, None]
+    point, weight = rows[np.arange(k) < counts[..., None]], np.ones(ends[-1], np.float32)
+    weight[ends[:-1]] += k - counts.ravel()  # the first point fills the remaining slots
     return point, weight, ends
 
 

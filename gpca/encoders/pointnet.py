@@ -25,8 +25,7 @@ class PointNet2(nn.Module):
     """PointNet++ with single-scale grouping (Qi et al. 2017b): set abstraction at 256 and 64 centroids, then the whole.
 
     The published radii of 0.2 and 0.4 are for clouds of diameter 2, so here 0.1 and 0.2, and at most half of the points
-    are centroids. Absolute coordinates are features too, and relative ones are divided by the radius, as they would be
-    learned late.
+    are centroids. Absolute coordinates are features too; relative ones, else learned late, are divided by the radius.
     """
 
     def __init__(self, width: int = 64, centroids: int = 256, radius: float = 0.1, neighbours: int = 32) -> None:

@@ -27,10 +27,9 @@ BESIDE = {  # files that a module reads from its folder
 def code_files(*modules: str) -> list[str]:
     """Return the files of modules and of all project modules that they import, and their files in `BESIDE`; sorted.
 
-    For ``module:function``, only the imports that the function needs count. Imports for type checking do not. A plugin
-    counts with its imports from its package or, if it is a single file, from its folder. Paths are relative where they
-    are below the working directory, else absolute. Modules that are chosen by name at run time (kinds of source,
-    encoders, explainers) must be given.
+    For ``module:function``, only the imports that the function needs count. A plugin counts with its imports from its
+    package or, if it is a single file, from its folder. Paths are relative where they are below the working directory.
+    Modules that are chosen by name at run time (kinds of source, encoders, explainers) must be given.
     """
     reached: dict[str, str] = {}  # module -> its file
     open_modules = list(modules)
@@ -143,8 +142,7 @@ def _file(module: str) -> Path | None:
 def code_stamp(*modules: str) -> str:
     """Write the names and hashes of all :func:`code_files` of modules, and return the file that holds them.
 
-    It changes when one of these does, and not when one is merely touched. The first time it is as old as the newest of
-    them, so that what was made before is kept.
+    It changes with them, not when one is merely touched; at first it is as old as the newest, to keep what was made.
     """
     files = code_files(*modules)
     text = "".join(f"{_sha256(file)}  {file}\n" for file in files)

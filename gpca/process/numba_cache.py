@@ -1,7 +1,5 @@
 """Numba with a cache of loops per state of their code and that of imported modules, which numba does not check."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import tempfile

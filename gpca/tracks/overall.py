@@ -1,8 +1,7 @@
 """One score across tracks: the area under the curve of generalized risk over coverage, and ranks with ties.
 
-A method answers what is wrong and how sure it is. Of the answers that are given down to a confidence, the generalized
-risk is the share of all samples that are answered wrongly; its area over the coverage (AUGRC: Traub et al. 2024, as in
-fd-shifts) is the mean risk of a wrong answer that is not held back. The score is the mean over the tracks.
+Of the answers that are given down to a confidence, the generalized risk is the share of all samples that are answered
+wrongly; its area over the coverage is AUGRC (Traub et al. 2024). The score is the mean over the tracks.
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,14 +1,12 @@
 """What is shipped with each track: the truth of its test samples, predictions of the published methods, and hashes."""
 
-from __future__ import annotations
-
 import hashlib
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -133,7 +131,7 @@ class Published:
             np.savez_compressed(partial, allow_pickle=False, **arrays)
 
     @classmethod
-    def load(cls, track: Track, path: Path | None = None) -> Published:
+    def load(cls, track: Track, path: Path | None = None) -> Self:
         """Read what is shipped with a track."""
         require_clone(f"track {track.name}")
         path = path or FOLDER / f"{track.name}.npz"

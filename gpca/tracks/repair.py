@@ -1,8 +1,7 @@
 """The track ``repair``: a function of one's own beside repair and the other rivals, on the samples of ``causes``.
 
 The function gets the observed cloud (N, 3), the model (M, 3), both in diameters and in the model's frame, and the
-initial pose (4, 4). It returns a pose T_target_source (4, 4), or that and its confidence (the larger, the surer), or
-None to abstain.
+initial pose. It returns a pose T_target_source (4, 4), or that and its confidence, or None to abstain.
 """
 
 import sys

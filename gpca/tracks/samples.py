@@ -1,7 +1,5 @@
 """The fixed samples of the tracks: cached, checked by hash, and made from the repository's data where missing."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess
@@ -12,7 +10,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path, PurePosixPath
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -47,7 +45,7 @@ class TrackSamples:
     @classmethod
     def of(
         cls, track: Track, cache: Path | None = None, processes: int | None = None, data_dir: Path | None = None
-    ) -> TrackSamples:
+    ) -> Self:
         """Return the samples of a track, in the user's cache or another folder."""
         published = Published.load(track)
         return cls(track, published, cache or cache_of(track), processes or os.cpu_count() or 1, data_dir)
@@ -249,20 +247,17 @@ def recipe_of(file: str, config: Mapping[str, Any]) -> Recipe:
         return Recipe("gpca.steps.scan_causes:measure", given, {}, outputs)
     step, inputs = "gpca.steps.causes:causes", {"causes": path("causes"), "causes_timings": timings("causes")}
     outputs = {kind: path(kind), "timings": timings(kind)}
-    if kind == HARD_REENACTMENTS:
-        step, kind = "gpca.steps.causes:reenact", HARD
-        inputs = {"causes": path(HARD), "causes_timings": timings(HARD)}
-        outputs = {"reenactments": path(HARD_REENACTMENTS), "timings": timings(HARD_REENACTMENTS)}
-        settings = {"reenactment": diagnosis["reenactment"], "causes": causes | controls["hard"]} | icp
-    elif kind in ("causes", HARD):
+    if kind in ("causes", HARD):
         inputs = {"objects": f"objects/{source}.npz"}
         settings = causes | (controls["hard"] if kind == HARD else {}) | icp
         outputs = {"causes": path(kind), "candidates": path(kind, "csv"), "timings": timings(kind)}
     elif kind == "descriptors":
         step, settings = "gpca.steps.causes:describe", diagnosis["descriptors"] | icp
-    elif kind == "reenactments":
-        step = "gpca.steps.causes:reenact"
-        settings = {"reenactment": diagnosis["reenactment"], "causes": causes} | icp
+    elif kind in ("reenactments", HARD_REENACTMENTS):
+        of, own = (HARD, controls["hard"]) if kind == HARD_REENACTMENTS else ("causes", {})
+        step, inputs = "gpca.steps.causes:reenact", {"causes": path(of), "causes_timings": timings(of)}
+        outputs = {"reenactments": path(kind), "timings": timings(kind)}
+        settings = {"reenactment": diagnosis["reenactment"], "causes": causes | own} | icp
     elif kind in ("cause_embeddings", "cause_encoders"):
         step, settings = "gpca.steps.causes:train_on_causes", diagnosis["encoder"]
         outputs = {"weights": path("cause_encoders", "pt"), "curve": path("cause_encoders", "csv")}

@@ -1,7 +1,5 @@
 """Lets a method learn from the training samples of a track and explain the test samples, as a run does."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -9,7 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -56,7 +54,7 @@ class PartPredictions(NamedTuple):
     @classmethod
     def of(
         cls, attribution: Attribution, labels: Sequence[str], seconds: float, rows: slice | np.ndarray = slice(None)
-    ) -> PartPredictions:
+    ) -> Self:
         """Return those in rows of an attribution."""
         calls = float(attribution.icp_calls_N[rows].mean())
         named = label_numbers(attribution.predicted_N[rows], labels)

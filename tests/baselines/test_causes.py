@@ -136,7 +136,7 @@ def test_the_judge_of_the_result_ranks_by_the_error_that_is_shown_and_learns_fro
 
 
 def test_every_kind_of_explainer_has_its_own_names():
-    assert explainer_module("gpca", CAUSES) == "baselines.gaussian_processes"
+    assert explainer_module("gpca", CAUSES) == "baselines.aligned_source"
     assert explainer_module("gpca") == "gpca.explainers.gpca"
     with pytest.raises(InputError, match="explainer 'shap_oracle': unknown; choose one of"):
         explainer_entry("shap_oracle", CAUSES)

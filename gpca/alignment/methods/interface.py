@@ -1,11 +1,9 @@
 """The interface of registration methods: a pair of clouds in, an outcome out; all lengths are in object diameters."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -46,11 +44,11 @@ class Pair:
                 raise InputError(f"{name} normals", fault, "give one finite vector per point")
         require_rigid(self.T_target_source_init, "initial pose")
 
-    def started_at(self, T_target_source: np.ndarray) -> Pair:
+    def started_at(self, T_target_source: np.ndarray) -> Self:
         """Return the pair with another initial pose."""
         return replace(self, T_target_source_init=T_target_source)
 
-    def with_normals(self, neighbors: int = NEIGHBORS) -> Pair:
+    def with_normals(self, neighbors: int = NEIGHBORS) -> Self:
         """Return the pair with normals of both clouds, estimated if missing."""
         missing = [name for name in ("source", "target") if getattr(self, f"{name}_normals") is None]
         normals: dict[str, Any] = {
@@ -86,7 +84,7 @@ class Outcome:
         return not self.failure
 
     @classmethod
-    def at(cls, pair: Pair, T_target_source: np.ndarray, distance: float, failure: str = "") -> Outcome:
+    def at(cls, pair: Pair, T_target_source: np.ndarray, distance: float, failure: str = "") -> Self:
         """Measure a pose as Open3D does, whatever the method minimized; without correspondences, it fails."""
         distance_N, _ = pair.target_tree.query(transform(T_target_source, pair.source), distance_upper_bound=distance)
         inlier_N = distance_N < distance

@@ -1,11 +1,9 @@
 """ICP as exchangeable stages, variants of one stage at a time (Rusinkiewicz & Levoy 2001), and trimmed ICP."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 import numpy as np
 
@@ -52,7 +50,7 @@ class Matches:
         """Root mean square of the distances."""
         return float(np.sqrt(np.square(self.distance).mean()))
 
-    def kept(self, keep_n: np.ndarray) -> Matches:
+    def kept(self, keep_n: np.ndarray) -> Self:
         """Return the matches of a mask or of rows."""
         arrays = ("source_rows", "source", "rows", "distance")
         return replace(self, **{name: getattr(self, name)[keep_n] for name in arrays})
