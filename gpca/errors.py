@@ -1,5 +1,6 @@
 """The exception for a user's mistake, which is shown as one line instead of a traceback."""
 
+import sys
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -48,3 +49,12 @@ def refusing(subject: object, fault: str, remedy: str) -> Iterator[None]:
         raise
     except Exception as error:
         raise InputError(subject, fault.replace("{}", str(error)), remedy) from error
+
+
+@contextmanager
+def one_line() -> Iterator[None]:
+    """End the process with one line for an InputError or OSError."""
+    try:
+        yield
+    except (InputError, OSError) as fault:
+        sys.exit(f"gpca: {fault}")
