@@ -57,4 +57,4 @@ rule all:
     default_target: True
     input:
         [f"<results>/{name}" for name in COLLECTED + ENDS],
-        [f"<results>/{result.main_file}" for result in RESULTS],
+        [f"<results>/{result.all_files[0]}" for result in RESULTS],

@@ -3,4 +3,4 @@
 from gpca.declarations.experiment import EXPLAINERS, ByName, Experiment, LeftOut, Names, Tidy  # noqa: F401
 from gpca.declarations.plan import Run, plain  # noqa: F401
 from gpca.declarations.result import Figure, Frame, Paths, Series, figure, numbers, table  # noqa: F401
-from gpca.declarations.step import Plan, Step, Wildcards, encoder_of  # noqa: F401
+from gpca.declarations.step import Plan, Step, Wildcards  # noqa: F401

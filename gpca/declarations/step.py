@@ -24,11 +24,6 @@ Settings = tuple[str, ...] | Callable[["Plan", Wildcards], Mapping[str, Any]]
 Files = str | Sequence[str] | Callable[["Plan", Wildcards], str | Sequence[str]]
 
 
-def encoder_of(config: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Settings of the encoder that GP-CA reads."""
-    return config["encoders"][config["embedding"]["encoder"]]
-
-
 @dataclass(frozen=True)
 class Plan:
     """What rules are made from: a run, its names, and the sources that its config and its rules define."""
@@ -45,7 +40,7 @@ class Plan:
     @property
     def encoder(self) -> Mapping[str, Any]:
         """Settings of the encoder that GP-CA reads."""
-        return encoder_of(self.config)
+        return self.config["encoders"][self.config["embedding"]["encoder"]]
 
     @property
     def encoder_module(self) -> str:

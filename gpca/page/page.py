@@ -18,7 +18,7 @@ from gpca.model.scene import ASSETS
 from gpca.page.comparison import page_comparison
 from gpca.page.findings import Titles, findings_of
 from gpca.page.samples import POINTS, RULE, cause_samples
-from gpca.reporting.registry import SUFFIXES, by_section
+from gpca.reporting.registry import SUFFIXES
 
 TEMPLATES = Path(__file__).parent / "templates"
 KEY_FIGURES = ("causes_example", "fig2_overview")  # the first of these that the run has opens the page
@@ -81,8 +81,10 @@ def write_page(folder: str | Path, run: FinishedRun) -> None:
     content = {name: _content(folder, result, run, links) for name, result in shown.items()}
     groups = {title: [content[name] for name in names if name in content] for title, names in GROUPS.items()}
     grouped = {*PAPER, *(name for names in GROUPS.values() for name in names)}
-    rest = [result for result in run.results if result.name not in grouped]
-    sections = {section: [content[result.name] for result in results] for section, results in by_section(rest).items()}
+    sections: dict[str, list[dict]] = {}
+    for result in run.results:
+        if result.name not in grouped:
+            sections.setdefault(result.section, []).append(content[result.name])
     key_figure = next((shown[name] for name in KEY_FIGURES if name in shown), None)
     suffix = {"tables": "csv", "figures": "pdf"}
     recorded = [folder / f"{result.kind}/{result.name}.{suffix[result.kind]}" for result in run.results]

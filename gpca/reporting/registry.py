@@ -61,11 +61,6 @@ class Result:
         """The paths of all its files; a run asks for the first, and the others come along."""
         return [self.file(suffix) for suffix in SUFFIXES[self.kind]]
 
-    @property
-    def main_file(self) -> str:
-        """The file by which a run asks for it."""
-        return self.all_files[0]
-
     def files(self, names: Names) -> dict[str, list[str] | str]:
         """Return the files of each input, a path where there can be but one."""
         return {source.argument: expand(source.files, self._shown(names)) for source in self.inputs}
@@ -110,14 +105,6 @@ def unknown_target(target: str, known: Iterable[str]) -> str:
     near = get_close_matches(target, known, n=3, cutoff=0.5)
     remedy = f"did you mean {' or '.join(near)}?" if near else f"choose one of {', '.join(known)}"
     return f"gpca: target '{target}': there is no such table, figure or stage; {remedy}"
-
-
-def by_section(results: Iterable[Any]) -> dict[str, list[Any]]:
-    """Return section -> its results, both in the order given."""
-    sections: dict[str, list[Any]] = {}
-    for result in results:
-        sections.setdefault(result.section, []).append(result)
-    return sections
 
 
 def expand(patterns: tuple[str, ...], names: Names) -> list[str] | str:

@@ -6,7 +6,7 @@ import pytest
 from gpca.declarations import registry
 from gpca.declarations.registry import registered, results_of
 from gpca.process.registry import load
-from gpca.reporting.registry import Input, Result, build, by_section, targets, unknown_target
+from gpca.reporting.registry import Input, Result, build, targets, unknown_target
 
 NAMES = {"source": ["ycb", "mine"], "seed": [0, 1], "first_seed": "0", "explainer": ["gpca", "forest"], "gpca": "gpca"}
 ENTRIES = {result.name: result for result in registered()}
@@ -48,7 +48,6 @@ def test_files_are_listed_where_a_name_is_a_list_and_one_path_where_it_is_not():
     assert result(given("recovery/policy_seed{first_seed}.json")).files(NAMES)["metrics"].endswith("seed0.json")
     assert result().all_files == [f"tables/table9_mine.{suffix}" for suffix in ("md", "csv", "json")]
     assert result(kind="figures", name="fig").all_files == ["figures/fig.png", "figures/fig.pdf"]
-    assert result().main_file == "tables/table9_mine.md"
 
 
 def test_a_result_of_which_a_name_is_empty_is_left_out():
@@ -87,11 +86,9 @@ def show(run, iterable, key, source):
     return run, iterable, key, source
 
 
-def test_short_names_are_the_papers_a_misspelt_one_is_answered_and_sections_keep_their_order():
+def test_short_names_are_the_papers_and_a_misspelt_one_is_answered():
     names = ["table1_single", "table1_extended", "fig2_overview", "reliability", "fig_confusions"]
     short = targets(result(name=name) for name in names)
     assert {key: value.name for key, value in short.items()} == {"table1": "table1_single", "fig2": "fig2_overview"}
     assert unknown_target("tabel2", ["table2", "page"]).endswith("did you mean table2?")
     assert unknown_target("xyz", ["table2", "page"]).endswith("choose one of page, table2")
-    a, b, c = (result(name=name, section=section) for name, section in (("a", "II"), ("b", "I"), ("c", "II")))
-    assert by_section([a, b, c]) == {"II": [a, c], "I": [b]}

@@ -44,7 +44,7 @@ for result in RESULTS:
             readers=result.readers,
             arguments=result.arguments,
             only=result.only,
-            config=token_of(result.main_file),
+            config=token_of(result.all_files[0]),
             caption=result.caption,
         script:
             "../scripts/result.py"

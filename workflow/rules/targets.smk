@@ -8,7 +8,7 @@ SHORT = targets(RESULTS)
 
 rule paper:
     input:
-        [f"<results>/{result.main_file}" for result in RESULTS if result.paper],
+        [f"<results>/{result.all_files[0]}" for result in RESULTS if result.paper],
 
 
 for short, result in SHORT.items():
@@ -17,7 +17,7 @@ for short, result in SHORT.items():
         name:
             short
         input:
-            f"<results>/{result.main_file}",
+            f"<results>/{result.all_files[0]}",
 
 
 # Of another config, so another Snakemake runs it.
