@@ -84,8 +84,7 @@ def table9_causes(run: Run, intervals):
         if (nominal := samples.get("false_alarm_rate")) is not None:
             states[title] = f"{nominal:.0f} are nominal and {samples.max() - nominal:.0f} failed"
     alike = len(states) > 1 and len(set(states.values())) == 1
-    counted = "; ".join(f"{words} on {title}" for title, words in states.items())
-    counted = f"{next(iter(states.values()))} on each dataset" if alike else counted
+    counted = "; ".join(dict.fromkeys(f"{of} on {'each dataset' if alike else title}" for title, of in states.items()))
     heads = {"source": "Dataset", "explainer": "Explainer", "reads": "Reads"}
     sheet = Sheet("table9_causes", heads, rows, SHOWN, intervals, more=counts_and_calls(costs))
     notes = (

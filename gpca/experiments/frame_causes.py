@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -27,7 +26,6 @@ from gpca.io.container import require_same_samples
 from gpca.io.csv_file import ANY, read_csv
 from gpca.objects.canonical import BY_ICP
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.process.plugins import is_outside
 from gpca.reporting.sheet import Cell, Column, Row, Sheet, dataset_in_words, plain_cell, plural, show, where
 from gpca.seeds import generator, seed_of_file
 
@@ -41,26 +39,11 @@ COUNTED = ("starts", "instances", "scenes", "objects", *LABELS, BORDERLINE, GEOM
 
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Seeds for which the causes are measured and explained, and the explainers from outside."""
-    explainers = config["diagnosis"]["explainers"]
-    return {
-        "frame_cause_seed": list(config["seeds"])[: config["real_world"]["causes"]["seeds"]],
-        "outside_explainer": [name for name in explainers if is_outside(explainer_module(name, CAUSES))],
-    }
+    """Seeds for which the causes are measured and explained."""
+    return {"frame_cause_seed": list(config["seeds"])[: config["real_world"]["causes"]["seeds"]]}
 
 
 EXPERIMENT = Experiment(name="frame_causes", names=names)
-
-
-def _asked(plan: Plan, names: Iterable[str]) -> dict[str, Any]:
-    """Settings of a job that asks some explainers of causes about depth frames."""
-    section, icp = plan.config["diagnosis"], plan.config["registrations"]["icp"]
-    return section | {"icp": icp, "explainers": {name: section["explainers"][name] for name in names}}
-
-
-def _inside(plan: Plan) -> list[str]:
-    names, outside = plan.config["diagnosis"]["explainers"], plan.names["outside_explainer"]
-    return [name for name in names if name not in outside]
 
 
 def _if_read(plan: Plan, files: str) -> str | list[str]:
@@ -84,21 +67,12 @@ DIAGNOSE_FRAMES = Step(
         "embeddings": "cause_embeddings/{*source}/seed{seed}.npz",
     },
     outputs={"predictions": "frame_diagnoses/seed{seed}.csv"},
-    settings=lambda plan, wildcards: _asked(plan, _inside(plan)),
+    settings=lambda plan, wildcards: plan.config["diagnosis"] | {"icp": plan.config["registrations"]["icp"]},
     params={"source": REAL_WORLD},
     modules=lambda plan: [
         encoder_module(plan.config["diagnosis"]["encoder"]),
-        *(explainer_module(name, CAUSES) for name in _inside(plan)),
+        *(explainer_module(name, CAUSES) for name in plan.config["diagnosis"]["explainers"]),
     ],
-)
-# Explainers from outside have jobs of their own, so that an edit of one leaves the others as they are.
-DIAGNOSE_FRAMES_OUTSIDE = replace(
-    DIAGNOSE_FRAMES,
-    name="diagnose_frames_outside",
-    outputs={"predictions": "frame_diagnoses/{outside_explainer}/seed{seed}.csv"},
-    settings=lambda plan, wildcards: _asked(plan, [wildcards.outside_explainer]),
-    modules=lambda plan: [encoder_module(plan.config["diagnosis"]["encoder"])],
-    modules_of_job=lambda plan, wildcards: [explainer_module(wildcards.outside_explainer, CAUSES)],
 )
 
 
@@ -107,11 +81,8 @@ DIAGNOSE_FRAMES_OUTSIDE = replace(
     causes_files="frame_causes/seed{frame_cause_seed}.npz",
     sample_files="frame_causes/seed{frame_cause_seed}.csv",
     prediction_files="frame_diagnoses/seed{frame_cause_seed}.csv",
-    outside_files="frame_diagnoses/{outside_explainer}/seed{frame_cause_seed}.csv",
 )
-def collect(
-    run: Run, causes_files: Paths, sample_files: Paths, prediction_files: Paths, outside_files: Paths = ()
-) -> Frame:
+def collect(run: Run, causes_files: Paths, sample_files: Paths, prediction_files: Paths) -> Frame:
     """Measures of explainers that learned from no frame, with intervals; the source is ``real_rgbd/{kind of start}``.
 
     An instance counts once in a measure, however many starts and seeds it has, and intervals are over scenes. Counts,
@@ -122,16 +93,15 @@ def collect(
 
     samples_of: dict[str, list[Judged]] = {}
     tested: list[Frame] = []
-    outside = list(outside_files)
     for causes_file, sample_file, prediction_file in zip(causes_files, sample_files, prediction_files, strict=True):
         causes, seed = Causes.load(causes_file), seed_of_file(causes_file)
         samples = read_csv(sample_file, SAMPLE_COLUMNS, others=ANY)
         samples = samples[[name for name in samples if name in SAMPLE_COLUMNS or name.startswith(FAILED_BY)]]
         require_same_samples(sample_file, samples, causes.registrations.arrays, "causes", ("sample",))
-        for path in (prediction_file, *(each for each in outside if seed_of_file(each) == seed)):
-            for explainer, rows in read_predictions(path, labels=("explainer",)).groupby("explainer", sort=False):
-                require_same_samples(path, rows, causes.registrations.arrays, "causes", ("sample",))
-                samples_of.setdefault(str(explainer), []).append(judged_by(rows, causes, seed))
+        said = read_predictions(prediction_file, labels=("explainer",))
+        for explainer, rows in said.groupby("explainer", sort=False):
+            require_same_samples(prediction_file, rows, causes.registrations.arrays, "causes", ("sample",))
+            samples_of.setdefault(str(explainer), []).append(judged_by(rows, causes, seed))
         samples_of.setdefault(CEILING, []).append(ceiling_of(causes, seed))
         tested.append(samples.assign(end=ends_of(causes.truth), seed=seed, object=causes.registrations.object_name))
     judged = {explainer: joined(parts) for explainer, parts in samples_of.items()}

@@ -50,18 +50,9 @@ POSE_COLUMNS = ("sample", "split", "instance", "init_error", "icp_error", "lost_
     predictions_csv="predictions/{frames}/{first_backbone}/seed{first_seed}.csv",
 )
 def draw_real_world_example(
-    run: Run,
-    instances_npz: str | Path,
-    objects_npz: str | Path,
-    registrations_npz: str | Path,
-    poses_csv: str | Path,
-    predictions_csv: str | Path,
+    run: Run, instances_npz: Path, objects_npz: Path, registrations_npz: Path, poses_csv: Path, predictions_csv: Path
 ) -> Figure:
-    """(a) A part of the frame with the object's region and what of it is covered, (b) its points at the initial
-    pose over the model as the camera sees both, (c) after ICP, with the estimated axes, and (d) the concept scores.
-
-    A pose is right whose error is below the config's `success.error`, in diameters.
-    """
+    """A pose is right whose error is below the config's `success.error`, in diameters."""
     from matplotlib.patches import Rectangle
     from matplotlib.patheffects import withStroke
 
@@ -143,10 +134,7 @@ def draw_real_world_example(
 
 
 def read_samples(poses_csv: str | Path, predictions_csv: str | Path) -> Frame:
-    """Poses and predictions of all samples side by side, in the order of the registrations.
-
-    Raises InputError for an unusable file, or files of different samples.
-    """
+    """Poses and predictions of all samples side by side, in the order of the registrations."""
     poses, predictions = read_csv(poses_csv, POSE_COLUMNS, others=FRAME_COLUMNS), read_predictions(predictions_csv)
     require_same_samples(poses_csv, poses, predictions, "predictions")
     for name in ("instance", "init_error", "icp_error"):
@@ -209,6 +197,5 @@ def draw_real_world_confusions(run: Run, metrics: Frame) -> Figure:
     """A matrix for each backbone with the first reduction: shares of each true concept in %, and counts."""
     frames = run.config["real_world"]
     first = next(iter(frames["reductions"]))
-    methods = [f"{backbone}-{first}" for backbone in frames["backbones"]]
-    titles = {method: encoder_title(*method.split("-")) for method in methods}
+    titles = {f"{backbone}-{first}": encoder_title(backbone, first) for backbone in frames["backbones"]}
     return draw_confusions(metrics, titles, (), title_of_frames(run.config), "{:.1f} %\nn = {:.0f}")

@@ -26,7 +26,6 @@ from gpca.seeds import generator
 from gpca.settings import Distinct, read_settings
 
 NAME = "guarantee"
-TRAINED_AGAIN = ("descriptors", REENACTED)  # inputs of explainers that are trained again, on one part of the families
 ROWS = ("condition", "source", "method", "variant")  # columns that distinguish the rows of tables
 COLUMNS = (
     *("table", *ROWS, "metric", "concept", "promised"),
@@ -44,7 +43,7 @@ class Section(asked_for.GuaranteeSettings):
 
 def check(config: dict, _left_out: LeftOut) -> None:
     for name in config[NAME]["explainers"]:
-        if explainer_entry(name, CAUSES).reads not in (*TRAINED_AGAIN, EMBEDDINGS):
+        if explainer_entry(name, CAUSES).reads not in ("descriptors", REENACTED, EMBEDDINGS):
             fault = f"explainer '{name}' reads neither descriptors nor re-enactments nor embeddings"
             raise InputError("config key guarantee.explainers", fault, "leave it out")
 
@@ -277,7 +276,7 @@ def guarantee(run: Run, measured):
             points = where(rows, {"metric": metric, "variant": variant}).set_index("method")
             for number, name in enumerate(titles):
                 if name in points.index:
-                    low, value, high = (scale * points.loc[name, column] for column in ("low", "value", "high"))
+                    low, value, high = scale * points.loc[name, ["low", "value", "high"]].to_numpy(float)
                     y = number + offsets[variant]
                     panel.plot([low, high], [y, y], color=color, linewidth=0.8)
                     panel.plot(value, y, marker, color=color, markersize=3)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from operator import contains
 from pathlib import Path
 from typing import Any
 
@@ -29,11 +30,8 @@ class Section(KernelGrid):
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
     grid = config["kernel_grid"]
-    printed = [
-        kernel
-        for kernel, rate, iterations in PRINTED
-        if kernel in grid["kernels"] and rate in grid["learning_rates"] and iterations in grid["iterations"]
-    ]
+    axes = [grid[axis] for axis in ("kernels", "learning_rates", "iterations")]
+    printed = [setting[0] for setting in PRINTED if all(map(contains, axes, setting))]
     return {"kernel_source": list(grid["sources"]), "printed_kernels": printed}
 
 

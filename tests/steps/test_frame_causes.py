@@ -101,20 +101,6 @@ def test_scenes_whose_truth_icp_made_are_counted_and_measure_nothing(asked, tmp_
     assert set(rows["source"]) == {"real_rgbd/pseudo_truth", "real_rgbd/pseudo_truth/tiny"}
 
 
-def test_explainers_from_outside_have_files_of_their_own_and_rows_beside_the_others(asked, tmp_path):
-    [said] = asked[2]
-    rows = pd.read_csv(said, dtype=str, keep_default_na=False)
-    outside = rows["explainer"] == "gpca_pair"
-    parts = [tmp_path / "suite/seed100.csv", tmp_path / "gpca_pair/seed100.csv"]
-    for path, own in zip(parts, (~outside, outside), strict=True):
-        path.parent.mkdir()
-        rows[own].to_csv(path, index=False)
-    order = ["source", "method", "metric", "against"]
-    both = [collect(None, *asked), collect(None, asked[0], asked[1], parts[:1], parts[1:])]
-    together, apart = (found.sort_values(order).reset_index(drop=True) for found in both)
-    pd.testing.assert_frame_equal(together, apart)
-
-
 def test_the_table_says_how_few_there_are(asked):
     frames = with_defaults({})["real_world"] | {"title": "Tiny", "datasets": {}}
     diagnosis = with_defaults({})["diagnosis"] | {"explainers": SETTINGS["explainers"]}
