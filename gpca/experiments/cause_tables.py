@@ -107,7 +107,7 @@ def table9_causes(run: Run, intervals):
         COST_NOTE,
     )
     caption = "What is wrong with a registration, if anything: objects that no explainer was trained on"
-    caption += ", procedural stand-ins among them" if run.stand_ins() else ""
+    caption += run.stand_ins()
     bold = sorted((key for key in SHOWN if key not in NOT_COMPARED), key=lambda key: key != "balanced_accuracy")
     return sheet.table(caption, "metric", notes, bold=bold, same=1)
 

@@ -74,10 +74,9 @@ def _controls_of(plan: Plan, wildcards: Wildcards) -> tuple[list[str], list[str]
     """
     own = wildcards.source in plan.names["hard_source"]
     chosen = [name for name in plan.config["controls"]["controls"] if own or name != HARD]
-    if int(wildcards.seed) in plan.names["control_seed"][: plan.config["controls"]["encoder_seeds"]]:
-        return list(chosen), [name for name in chosen if name in RETRAINED]
-    controls = [name for name in chosen if name in samples.OF_EVERY_SEED or name not in RETRAINED]
-    return controls, [name for name in controls if name in RETRAINED]
+    if int(wildcards.seed) not in plan.names["control_seed"][: plan.config["controls"]["encoder_seeds"]]:
+        chosen = [name for name in chosen if name in samples.OF_EVERY_SEED or name not in RETRAINED]
+    return chosen, [name for name in chosen if name in RETRAINED]
 
 
 def _of_all_hard(plan: Plan, wildcards: Wildcards, file: str, read: str = "") -> list[str]:

@@ -141,7 +141,6 @@ CALIBRATED = {
     asked_for.BY_FAMILY: "By family",
 }
 WORST = "worst_state"
-STAND_INS = ", procedural stand-ins among them"
 NUMBER: dict[str, Any] = {"interval": False, "decimals": 0, "limits": (0.0, inf), "factor": 1}
 SIZES: dict[str, Any] = {"decimals": 2, "limits": (0.0, float(len(STATES))), "factor": 1, "least_is_best": True}
 COLUMNS_OF_ALL = {
@@ -186,22 +185,17 @@ def table19_guarantee(run: Run, measured):
     sheet = Sheet("table19_guarantee", heads, rows, COLUMNS_OF_ALL, _with_counts(pooled))
     names = ("level", "missed", "false_alarms", "family_risk")
     level, missed, false_alarms, family_risk = (f"{100 * run.config[NAME][name]:g}" for name in names)
-    return sheet.table(
-        "Sets of states that hold the true one, and an alarm with bounded errors, on families of shapes that nothing "
-        "was trained or calibrated on" + (STAND_INS if run.stand_ins() else ""),
-        "metric",
-        [
-            f"Guaranteed: sets that hold the state in {level} % of the cases (Coverage); at most {missed} % of the "
-            f"failed called good (Missed failures) and {false_alarms} % of the nominal called failed (False alarms), "
-            f"by family {family_risk} % each.",
-            "States: nominal, one cause, or several. None: the most probable states until their scores add up to the "
-            "guaranteed share, and one threshold set in training, or 0.5. By sample: guaranteed if samples are "
-            f"exchangeable; by family: if families are. A set of {len(STATES)} states, or an alarm that is never sure, "
-            "states nothing.",
-            "Families: smallest number of calibration families of a tested one. n: tested samples without borderline "
-            f"ones, of {int(pooled['clusters'].max())} families. {sheet.over()}.",
-        ],
+    notes = (
+        f"Guaranteed: sets that hold the state in {level} % of the cases (Coverage); at most {missed} % of the failed "
+        f"called good (Missed failures) and {false_alarms} % of the nominal called failed (False alarms), by family "
+        f"{family_risk} % each. None: the most probable states until their scores add up to the guaranteed share, and "
+        "one threshold set in training, or 0.5. By sample: guaranteed if samples are exchangeable; by family: if "
+        f"families are. A set of {len(STATES)} states, or an alarm that is never sure, states nothing.",
+        "Families: smallest number of calibration families of a tested one. n: tested samples without borderline "
+        f"ones, of {int(pooled['clusters'].max())} families. {sheet.over()}.",
     )
+    caption = "Sets of states that hold the true one, and an alarm with bounded errors, on families of shapes that "
+    return sheet.table(caption + "nothing was trained or calibrated on" + run.stand_ins(), "metric", notes)
 
 
 @table(
@@ -226,18 +220,15 @@ def table19_shift(run: Run, measured):
     heads = {"calibrated_on": "Calibrated on", "source": "Tested on", "explainer": "Explainer"}
     sheet = Sheet("table19_shift", heads, rows, COLUMNS_OF_SHIFT, _with_counts(measured))
     level, missed, false_alarms = (f"{100 * run.config[NAME][name]:g}" for name in ("level", "missed", "false_alarms"))
-    return sheet.table(
-        "Guarantees for causes on single datasets, and where calibrated and tested samples differ"
-        + (STAND_INS if run.stand_ins() else ""),
-        "metric",
-        [
-            f"The limits are those of Table XIX, by sample: {level} % coverage, at most {missed} % missed failures and "
-            f"{false_alarms} % false alarms. Nothing guarantees them here: the numbers show what is left.",
-            "Each state: limits for each state by itself. Halves: by the largest severity, nominal and failed samples "
-            "separately. All starts of an instance in depth frames have the weight of one sample, intervals are over "
-            f"scenes, and fewer than {FEWEST_FAILURES} samples of a kind are not shown.",
-        ],
+    notes = (
+        f"The limits are those of Table XIX, by sample: {level} % coverage, at most {missed} % missed failures and "
+        f"{false_alarms} % false alarms; nothing guarantees them here. Each state: limits for each state by itself.",
+        "Halves: by the largest severity, nominal and failed samples separately. All starts of an instance in depth "
+        f"frames have the weight of one sample, intervals are over scenes, and fewer than {FEWEST_FAILURES} samples "
+        "of a kind are not shown.",
     )
+    caption = "Guarantees for causes on single datasets, and where calibrated and tested samples differ"
+    return sheet.table(caption + run.stand_ins(), "metric", notes)
 
 
 @figure(
