@@ -85,7 +85,7 @@ def trained(path: Path, name: str, seed: int, epochs: int) -> dict[str, str]:
     h_S_d, logits_S_C = embed(model, registrations, source, seed, settings)
     train, test = registrations.rows("train"), registrations.rows("test")
     labels_S = registrations.concept
-    scores_N_C = GPC(classes, GPCSettings(), source, seed).fit(h_S_d[train], labels_S[train]).scores(h_S_d[test])
+    scores_N_C = GPC(classes, GPCSettings(), source, seed).fit(h_S_d[train], labels_S[train]).attribute(h_S_d[test])[0]
     values = {
         "loss": curve[-1]["loss"],
         "train_accuracy": curve[-1]["accuracy"],

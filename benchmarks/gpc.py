@@ -48,7 +48,7 @@ def main(arguments: list[str] | None = None) -> None:
         plain = GpytorchGPC(CONCEPTS, settings, "benchmark", 0)
         plain_s.append(seconds(lambda plain=plain: plain.fit(h_N_d, labels_N)))
     error = float(np.abs(gpc.posterior(h_test_d)[0] - plain.posterior(h_test_d)[0]).max())
-    score_difference = float(np.abs(gpc.scores(h_test_d) - plain.attribute(h_test_d)[0]).max())
+    score_difference = float(np.abs(gpc.attribute(h_test_d)[0] - plain.attribute(h_test_d)[0]).max())
     one_s = [seconds(lambda row=row: gpc.attribute(h_test_d[row : row + 1])) for row in range(20 * options.repeats)]
     all_s = [seconds(lambda: gpc.attribute(h_test_d)) for _ in range(5 * options.repeats)]
     plain_all_s = [seconds(lambda: plain.attribute(h_test_d)) for _ in range(5 * options.repeats)]

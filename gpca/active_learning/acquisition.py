@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gpca.classifier.kmeans import kmeans_plusplus
 from gpca.errors import InputError, require_known
 from gpca.io.arrays import require_numbers
 from gpca.process.plugins import joined_outside, module_outside
@@ -107,6 +106,25 @@ def bald_kmeans(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarr
     distance_n = np.square(h_n_d - centers_B_d[cluster_n]).sum(axis=1)
     nearest = [min(np.flatnonzero(cluster_n == cluster), key=distance_n.__getitem__) for cluster in range(batch)]
     return candidates[sorted(nearest)]
+
+
+def kmeans_plusplus(x_n_d: np.ndarray, clusters: int, seed: int) -> list[int]:
+    """Return the rows of first centers by k-means++ (Arthur and Vassilvitskii 2007), as scikit-learn chooses them."""
+    random, square_n, n = np.random.RandomState(seed), np.einsum("nd,nd->n", x_n_d, x_n_d), len(x_n_d)
+
+    def distances(rows: np.ndarray) -> np.ndarray:
+        return np.maximum(-2 * (x_n_d[rows] @ x_n_d.T) + square_n[rows, None] + square_n, 0)
+
+    chosen = [int(random.choice(n, p=np.full(n, 1 / n)))]
+    nearest_1_n = distances(np.array(chosen))
+    while len(chosen) < clusters:
+        drawn = random.uniform(size=2 + int(np.log(clusters))) * (nearest_1_n @ np.ones(n))
+        tried_T = np.clip(np.searchsorted(np.cumsum(nearest_1_n), drawn), None, n - 1)
+        nearest_T_n = np.minimum(nearest_1_n, distances(tried_T))
+        best = np.argmin(nearest_T_n @ np.ones(n))
+        nearest_1_n = nearest_T_n[best]
+        chosen.append(int(tried_T[best]))
+    return chosen
 
 
 def balanced_kmeans(h_n_d: np.ndarray, clusters: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:

@@ -140,7 +140,7 @@ def pool_of(
 
 def step_of(task: LabelingTask, classifier: Any, queried: list[int], epochs: int) -> dict[str, float]:
     """Return a step of :func:`rounds`; an accuracy without test samples is NaN."""
-    named_N = np.array(classifier.classes)[classifier.scores(task.test.h).argmax(axis=1)]
+    named_N = np.array(classifier.classes)[classifier.attribute(task.test.h)[0].argmax(axis=1)]
     right_N = named_N == task.test.concept_N
     new_N = task.test.concept_N == task.held_out
     return {

@@ -73,10 +73,6 @@ class BayesianLayer:
         scores_N_C, variances_N_C, _ = summarize_draws(drawn_M_N_C)
         return scores_N_C, variances_N_C, 1 - scores_N_C.max(axis=1)
 
-    def scores(self, h: Projection) -> np.ndarray:
-        """Return the scores alone."""
-        return self.attribute(h)[0]
-
 
 def _settled(before_C: np.ndarray, prior_C_C: np.ndarray, label: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the most probable logits of a sample of this class under N(before, prior), and their curvature (C, C)."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,10 +28,11 @@ def write_predictions(path: str | Path, registrations: Registrations, attributio
     write_columns(path, _columns(registrations, attribution))
 
 
-def prediction_frame(registrations: Registrations, attribution: Attribution) -> Frame:
+def prediction_frame(registrations: Registrations, attribution: Attribution, **labels: Any) -> Frame:
+    """Return the columns of a prediction file after those of labels, which tell its rows from those of others."""
     import pandas as pd
 
-    return pd.DataFrame(_columns(registrations, attribution))
+    return pd.DataFrame({**labels, **_columns(registrations, attribution)})
 
 
 def _columns(registrations: Registrations, attribution: Attribution) -> dict[str, np.ndarray]:

@@ -10,16 +10,16 @@ import numpy as np
 
 from gpca.classifier.latents import Latents, Projection, Sites, elbo, refine
 from gpca.classifier.prior import Covariance, Prior, Standardization
-from gpca.classifier.scores import score_marginals, summarize_marginals
+from gpca.classifier.scores import summarize_marginals
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.process.progress import progress
-from gpca.seeds import generator
+from gpca.seeds import generator, seed_of
 
 if TYPE_CHECKING:
     import torch
 
-    from gpca.classifier.sparse_gp import SparseGPs, Start
+    from gpca.classifier.sparse_gp import SparseGPs
 
 
 class GPC:
@@ -50,7 +50,7 @@ class GPC:
         """Yield each number of iterations in rising order, fitted so far, perhaps from the result of another."""
         import torch
 
-        from gpca.classifier.sparse_gp import SparseGPs, Start
+        from gpca.classifier.sparse_gp import SparseGPs
         from gpca.portable import Adam
 
         if before is None:
@@ -59,11 +59,11 @@ class GPC:
             start = self.start(torch.from_numpy(self._scaler.single(around_R_d)))
         else:
             self._scaler = before._scaler
-            start = Start.after(before._prior, self._axes)
+            start = before._prior
         inputs_N_d = torch.from_numpy(self._scaler.single(h_N_d))
         targets_N = self._targets(labels_N)
-        random = torch.Generator().manual_seed(start.seed)
-        model = SparseGPs(start.covariance, start.inducing_M_d, random)
+        random = torch.Generator().manual_seed(seed_of(*self._axes, "gpc"))
+        model = SparseGPs(start, random)
         if before is not None:
             model.set_posterior(before._latents)
         optimizer = Adam(model.parameters(), self.settings.learning_rate)
@@ -84,11 +84,11 @@ class GPC:
         """Return the scaling of the inputs; overridden by a reading of the paper."""
         return Standardization.of(around_R_d)
 
-    def start(self, inputs_R_d: torch.Tensor) -> Start:
+    def start(self, inputs_R_d: torch.Tensor) -> Prior:
         """Return the start of a fit around scaled inputs; overridden by a reading of the paper."""
-        from gpca.classifier.sparse_gp import Start
+        from gpca.classifier.sparse_gp import start_of
 
-        return Start.of(inputs_R_d, len(self.classes), self.settings, self._axes)
+        return start_of(inputs_R_d, len(self.classes), self.settings, self._axes)
 
     def objective(
         self, model: SparseGPs, inputs_N_d: torch.Tensor, targets_N: torch.Tensor, _random: torch.Generator
@@ -146,14 +146,8 @@ class GPC:
 
     def attribute(self, h_N_d: np.ndarray | Projection) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return scores_N_C, variances_N_C, bald_N from M posterior draws, the same for all points (Eqs. 4, 5, 7)."""
-        return summarize_marginals(*self.posterior(h_N_d), self._draws())
-
-    def scores(self, h_N_d: np.ndarray | Projection) -> np.ndarray:
-        """Return the scores_N_C of :meth:`attribute` alone."""
-        return score_marginals(*self.posterior(h_N_d), self._draws())
-
-    def _draws(self) -> np.ndarray:
-        return generator(*self._axes, "draws").normal(size=(self.settings.draws, len(self.classes)))
+        normal_M_C = generator(*self._axes, "draws").normal(size=(self.settings.draws, len(self.classes)))
+        return summarize_marginals(*self.posterior(h_N_d), normal_M_C)
 
     def state(self) -> dict[str, object]:
         """Return arrays, numbers and names for :meth:`from_state`."""

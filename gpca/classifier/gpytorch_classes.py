@@ -12,10 +12,11 @@ from torch.overrides import TorchFunctionMode
 from gpca.classifier.gpc import GPC
 from gpca.classifier.latents import expected_log_likelihood
 from gpca.classifier.prior import Covariance, Standardization
-from gpca.classifier.sparse_gp import Start
+from gpca.classifier.sparse_gp import start_of
 from gpca.errors import InputError
 from gpca.portable import Adam, square_root
 from gpca.process.progress import progress
+from gpca.seeds import seed_of
 
 
 class ScaledPolynomial(gpytorch.kernels.PolynomialKernel):
@@ -66,11 +67,6 @@ class LatentGPs(gpytorch.models.ApproximateGP):
         """Return the prior."""
         return gpytorch.distributions.MultivariateNormal(self.mean_module(inputs), self.covar_module(inputs))
 
-    @property
-    def strategy(self) -> gpytorch.variational.VariationalStrategy:
-        """The strategy inside that of the classes."""
-        return self.variational_strategy.base_variational_strategy
-
 
 def ascend(model: LatentGPs, inputs_N_d: Tensor, targets_N: Tensor, learning_rate: float) -> Iterator[float]:
     """Yield, without end, the loss before each step of Adam on the ELBO, by torch's global random numbers."""
@@ -101,10 +97,10 @@ class GpytorchGPC(GPC):
         self._scaler = Standardization.of(h_N_d)
         self._inputs_N_d = torch.from_numpy(self._scaler.single(h_N_d))
         self._targets_N = self._targets(labels_N)
-        start = Start.of(self._inputs_N_d, len(self.classes), self.settings, self._axes)
-        self._model = LatentGPs(gpytorch_kernel(start.covariance), start.inducing_M_d)
+        start = start_of(self._inputs_N_d, len(self.classes), self.settings, self._axes)
+        self._model = LatentGPs(gpytorch_kernel(start.covariance), torch.from_numpy(start.inducing_M_d))
         steps = ascend(self._model, self._inputs_N_d, torch.from_numpy(self._targets_N), self.settings.learning_rate)
-        state = torch.Generator().manual_seed(start.seed).get_state()
+        state = torch.Generator().manual_seed(seed_of(*self._axes, "gpc")).get_state()
         stops = sorted(set(iterations))
         for done in progress(range(1, stops[-1] + 1), " ".join(map(str, ("gpytorch's GPC", *self._axes)))):
             with torch.random.fork_rng(devices=[]), SameRoots():

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from scipy.special import softmax
+from scipy.special import log_softmax, softmax
 
 STEP = 0.5  # toward new sites, of their refinement
 
@@ -119,10 +119,7 @@ def elbo(projection: Projection, targets_N: np.ndarray, latents: Latents) -> flo
 
 def expected_log_likelihood(mean_N_C: np.ndarray, deviation_N_C: np.ndarray, targets_N: np.ndarray) -> float:
     """Return Σ E_q[log softmax(f)_y] in nats for independent latents with these marginals."""
-    logits_Q_N_C = mean_N_C + deviation_N_C * _normal_points(mean_N_C.shape[1])[:, None]
-    largest_Q_N_1 = logits_Q_N_C.max(axis=2, keepdims=True)
-    log_p_Q_N_C = logits_Q_N_C - largest_Q_N_1
-    log_p_Q_N_C = log_p_Q_N_C - np.log(np.exp(log_p_Q_N_C).sum(axis=2, keepdims=True))
+    log_p_Q_N_C = log_softmax(mean_N_C + deviation_N_C * _normal_points(mean_N_C.shape[1])[:, None], axis=2)
     return float(log_p_Q_N_C[:, np.arange(len(targets_N)), targets_N].mean(axis=0).sum())
 
 

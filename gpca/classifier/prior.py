@@ -23,12 +23,12 @@ DEFAULT = math.log(2)  # start of a scale, lengthscale or offset: gpytorch's
 class Covariance:
     """C covariances of one form, with separate scales, and lengthscales or, if polynomial, offsets."""
 
-    form: str  # one of `COVARIANCES`
+    form: Kernel
     scale_C: np.ndarray
     parameter_C: np.ndarray
 
     @classmethod
-    def start(cls, form: str, n_classes: int, lengthscale: float = DEFAULT) -> Covariance:
+    def start(cls, form: Kernel, n_classes: int, lengthscale: float = DEFAULT) -> Covariance:
         """Return equal covariances from which a fit starts; the polynomial one has no lengthscale."""
         parameter = DEFAULT if form == "polynomial" else lengthscale
         return cls(form, np.full(n_classes, DEFAULT), np.full(n_classes, parameter))

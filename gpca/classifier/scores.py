@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -101,41 +100,23 @@ def summarize_marginals(
     mean_N_C: np.ndarray, deviation_N_C: np.ndarray, normal_M_C: np.ndarray, block: int = 16
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Summarize draws mean + deviation · normal, the same for all points, as :func:`summarize_draws` does."""
-    parts = [_summarize(logits_C_N_M) for logits_C_N_M in _drawn(mean_N_C, deviation_N_C, normal_M_C, block)]
-    scores_N_C, variances_N_C, bald_N = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return scores_N_C, variances_N_C, bald_N
-
-
-def score_marginals(
-    mean_N_C: np.ndarray, deviation_N_C: np.ndarray, normal_M_C: np.ndarray, block: int = 16
-) -> np.ndarray:
-    """Return the scores (N, C) of :func:`summarize_marginals` alone, in two thirds of its time."""
-    drawn = _drawn(mean_N_C, deviation_N_C, normal_M_C, block)
-    return np.concatenate([_probabilities(logits_C_N_M)[0].mean(axis=2).T for logits_C_N_M in drawn])
-
-
-def _drawn(mean_N_C: np.ndarray, deviation_N_C: np.ndarray, normal_M_C: np.ndarray, block: int) -> Iterator[np.ndarray]:
-    normal_C_1_M = np.ascontiguousarray(normal_M_C.T)[:, None]
+    normal_C_1_M, parts = np.ascontiguousarray(normal_M_C.T)[:, None], []
     for start in range(0, max(len(mean_N_C), 1), block):
         rows = slice(start, start + block)
         logits_C_N_M = normal_C_1_M * deviation_N_C[rows].T[:, :, None]
         logits_C_N_M += mean_N_C[rows].T[:, :, None]
-        yield logits_C_N_M
-
-
-def _probabilities(logits_C_N_M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return softmax(f) and Σ exp f (N, M) of the logits, which are lowered so that the largest is 0."""
-    logits_C_N_M -= logits_C_N_M.max(axis=0)
-    p_C_N_M = np.exp(logits_C_N_M)
-    total_N_M = p_C_N_M.sum(axis=0)
-    p_C_N_M /= total_N_M
-    return p_C_N_M, total_N_M
+        parts.append(_summarize(logits_C_N_M))
+    scores_N_C, variances_N_C, bald_N = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return scores_N_C, variances_N_C, bald_N
 
 
 def _summarize(logits_C_N_M: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     # In the given array, as new ones would take most of the time. Classes come first, as sums over three neighbors are
     # slow, and draws last, so that a point's sums do not depend on how many others there are.
-    p_C_N_M, total_N_M = _probabilities(logits_C_N_M)
+    logits_C_N_M -= logits_C_N_M.max(axis=0)
+    p_C_N_M = np.exp(logits_C_N_M)
+    total_N_M = p_C_N_M.sum(axis=0)
+    p_C_N_M /= total_N_M
     scores_C_N = p_C_N_M.mean(axis=2)
     # H[softmax(f)] = log Σ exp f - Σ p f: one logarithm per draw instead of one per class.
     logits_C_N_M *= p_C_N_M

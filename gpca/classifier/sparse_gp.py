@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 from torch.nn.functional import softplus
 
-from gpca.classifier.kmeans import kmeans
 from gpca.classifier.latents import Latents
 from gpca.classifier.prior import JITTER, Covariance, Prior
 from gpca.classifier.settings import GPCSettings
@@ -75,11 +73,11 @@ def squared_distances(a_A_d: Tensor, b_B_d: Tensor) -> Tensor:
 class SparseGPs(nn.Module):
     """C independent GPs with shared inducing inputs, separate covariances and whitened posteriors N(mean, R Rᵀ)."""
 
-    def __init__(self, covariance: Covariance, inducing_M_d: Tensor, random: torch.Generator) -> None:
+    def __init__(self, start: Prior, random: torch.Generator) -> None:
         super().__init__()
-        shape = (len(covariance.scale_C), len(inducing_M_d))
-        self.covariance = LearnedCovariance(covariance)
-        self.inducing_M_d = nn.Parameter(inducing_M_d.clone())
+        shape = (len(start.covariance.scale_C), len(start.inducing_M_d))
+        self.covariance = LearnedCovariance(start.covariance)
+        self.inducing_M_d = nn.Parameter(torch.from_numpy(start.inducing_M_d).clone())
         self.mean_C_M = nn.Parameter(MEAN_DEVIATION * torch.randn(shape, generator=random))
         self.root_C_M_M = nn.Parameter(torch.eye(shape[1]).repeat(shape[0], 1, 1))  # only its lower triangle is used
         self._random = random
@@ -140,26 +138,16 @@ def _cholesky(K_C_M_M: Tensor) -> Tensor:
     raise InputError("covariance of the classifier", "is not positive definite", "lower its learning rate")
 
 
-@dataclass(frozen=True)
-class Start:
-    """The start of a fit, the same for :mod:`gpca.classifier.gpc` and :mod:`gpca.classifier.gpytorch_classes`."""
+def start_of(inputs_N_d: Tensor, n_classes: int, settings: GPCSettings, axes: tuple) -> Prior:
+    """Return the prior from which a fit to standardized inputs starts, with k-means centers; `axes` name the seeds."""
+    from sklearn.cluster import KMeans
+    from threadpoolctl import threadpool_limits
 
-    # Its lengthscale is the median distance: with gpytorch's, an RBF kernel on some hundred dimensions stays at chance.
-    covariance: Covariance
-    inducing_M_d: Tensor  # k-means centers of the standardized inputs, at most as many as there are distinct inputs
-    seed: int  # of the initial variational mean and the samples of the likelihood
-
-    @classmethod
-    def of(cls, inputs_N_d: Tensor, n_classes: int, settings: GPCSettings, axes: tuple) -> Start:
-        """Return the start around standardized inputs; `axes` name the seeds."""
-        order = generator(*axes, "median").permutation(len(inputs_N_d))[:MOST_MEDIAN]
-        median = float(torch.pdist(inputs_N_d[order]).median()) if len(order) > 1 else 0.0
-        covariance = Covariance.start(settings.kernel, n_classes, median if median > 0 else 1.0)
-        clusters = min(settings.inducing, len(torch.unique(inputs_N_d, dim=0)))
-        centers_M_d = kmeans(inputs_N_d.numpy(), clusters, seed_of(*axes, "inducing") % 2**32)
-        return cls(covariance, torch.from_numpy(centers_M_d.astype(np.float32)), seed_of(*axes, "gpc"))
-
-    @classmethod
-    def after(cls, prior: Prior, axes: tuple) -> Start:
-        """Return the start at the result of an earlier fit."""
-        return cls(prior.covariance, torch.from_numpy(prior.inducing_M_d), seed_of(*axes, "gpc"))
+    # The lengthscale is the median distance: with gpytorch's, an RBF kernel on some hundred dimensions learns nothing.
+    order = generator(*axes, "median").permutation(len(inputs_N_d))[:MOST_MEDIAN]
+    median = float(torch.pdist(inputs_N_d[order]).median()) if len(order) > 1 else 0.0
+    covariance = Covariance.start(settings.kernel, n_classes, median if median > 0 else 1.0)
+    clusters = min(settings.inducing, len(torch.unique(inputs_N_d, dim=0)))
+    means = KMeans(clusters, n_init=1, random_state=seed_of(*axes, "inducing") % 2**32)
+    with threadpool_limits(1):  # several threads add up in any order
+        return Prior(covariance, means.fit(inputs_N_d.numpy()).cluster_centers_)

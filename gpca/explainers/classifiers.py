@@ -13,7 +13,6 @@ from gpca.seeds import seed_of
 
 PAPERS_RANDOM_STATE = 42  # of the forest and of the linear SVM in Table V
 LEAF = -1  # in place of a leaf's feature
-PARTS = ("roots", "feature", "number", "right")  # arrays of :class:`BoostedQuestion`
 
 
 class ConceptClassifier:
@@ -39,7 +38,7 @@ class ConceptClassifier:
 
 def known_concepts(concept_N: np.ndarray, labels: tuple[str, ...] = CONCEPTS) -> list[str]:
     """Return the labels that occur in training, in their order; fewer than two raise an InputError."""
-    present = [label for label in labels if (concept_N == label).any()]
+    present = [label for label in labels if label in concept_N]
     if len(present) < 2:
         raise InputError("training registrations", "cover fewer than two concepts", "give samples of at least two")
     return present
@@ -94,7 +93,6 @@ class BoostedQuestion:
         return cls(float(fitted._baseline_prediction[0, 0]), *_joined(trees))
 
     def probability(self, inputs_N_F: np.ndarray) -> np.ndarray:
-        """Return the probability of yes (N,)."""
         from scipy.special import expit
 
         return expit(self.log_odds(inputs_N_F))
@@ -109,19 +107,10 @@ class BoostedQuestion:
             at_N_T[rows, columns] = np.where(left, nodes + 1, self.right[nodes])
         return self.baseline + self.number[at_N_T].sum(axis=1)
 
-    def state(self) -> dict[str, object]:
-        """Return numbers and arrays for :meth:`from_state`."""
-        return {"baseline": self.baseline} | {name: getattr(self, name) for name in PARTS}
-
-    @classmethod
-    def from_state(cls, state: dict) -> BoostedQuestion:
-        """Return the trees of a :meth:`state`."""
-        return cls(state["baseline"], *(state[name] for name in PARTS))
-
 
 def require_trees(state: dict, features: int) -> None:
-    """Raise a ValueError unless a :meth:`BoostedQuestion.state` holds terminating trees on this many features."""
-    parts = roots, feature, number, right = [state[name] for name in PARTS]
+    """Raise a ValueError unless these fields of a :class:`BoostedQuestion` are trees that end, on so many features."""
+    parts = roots, feature, number, right = [state[name] for name in ("roots", "feature", "number", "right")]
     kinds = (np.int32, np.int16, np.float64, np.int32)
     if any(part.ndim != 1 or part.dtype != kind for part, kind in zip(parts, kinds, strict=True)):
         raise ValueError("its trees have parts of a different shape or type")

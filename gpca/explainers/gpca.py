@@ -17,7 +17,6 @@ class GPCA(ScoringExplainer):
         self._gpc = GPC(self.labels, GPCSettings(**settings), source, seed)
 
     def fit(self, registrations: Registrations) -> None:
-        """Fit the GPC to the labeled embeddings."""
         self._gpc.fit(self._inputs(registrations), registrations.concept)
 
     def learn(self, registrations: Registrations) -> None:
@@ -25,7 +24,6 @@ class GPCA(ScoringExplainer):
         self._gpc.update(self._inputs(registrations), registrations.concept)
 
     def summary(self, registrations: Registrations) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Summarize draws from the posterior at every embedding."""
         return self._gpc.attribute(self._inputs(registrations))
 
     def _inputs(self, registrations: Registrations) -> np.ndarray:
@@ -42,7 +40,6 @@ class DescriptorGPCA(GPCA):
         self._normalized = NormalizedFeatures(*axes)
 
     def fit(self, registrations: Registrations) -> None:
-        """Learn the ranks of the descriptors, and fit the GPC to the labeled registrations."""
         features_N_F = self.features(registrations)
         self._normalized.fit(features_N_F)
         self._gpc.fit(self._normalized(features_N_F), registrations.concept)

@@ -125,11 +125,9 @@ class ClassifierExplainer(ScoringExplainer):
         self._classifier = ConceptClassifier(classifier, self.labels)
 
     def fit(self, registrations: Registrations) -> None:
-        """Fit the classifier to the labeled registrations."""
         self._classifier.fit(self.features(registrations), registrations.concept)
 
     def scores(self, registrations: Registrations) -> np.ndarray:
-        """Return the classifier's probabilities."""
         return self._classifier.scores(self.features(registrations))
 
     def features(self, registrations: Registrations) -> np.ndarray:
@@ -163,9 +161,7 @@ class ExplainerEntry:
     # What it needs attached: ``embeddings`` of the encoder, ``uncertainty/<design>`` outcomes of a design
     # (:mod:`gpca.uncertainty.designs`), or ``registrations``: nothing.
     reads: str = BARE
-    oracle: bool = (
-        False  # whether it knows the truth about what it explains: an upper bound, which its title has to say
-    )
+    oracle: bool = False  # whether it knows the truth about what it explains: a bound, which its title has to say
     observed_only: bool = False  # of a design's outcomes it reads the first alone, that of the observed pair
     further: bool = False  # whether it learns from further samples too, which have quick descriptors alone
 

@@ -32,35 +32,23 @@ class NormalizedFeatures:
         self._axes = axes
 
     def fit(self, features_N_F: np.ndarray) -> NormalizedFeatures:
-        """Learn the ranks."""
         rows_N, seed = np.arange(len(features_N_F)), seed_of(*self._axes, "quantiles") % 2**32
         if len(rows_N) > RANKED:
             np.random.RandomState(seed).shuffle(rows_N)
         percents_Q = 100 * np.linspace(0, 1, min(QUANTILES, len(rows_N)))
-        self._quantiles_Q_F = np.nanpercentile(features_N_F[rows_N[:RANKED]], percents_Q, axis=0)
+        self.quantiles_Q_F = np.nanpercentile(features_N_F[rows_N[:RANKED]], percents_Q, axis=0)
         return self
 
     def __call__(self, features_N_F: np.ndarray) -> np.ndarray:
         """Return the normalized descriptors (N, F), as scikit-learn to the last digit; ties get their mean rank."""
-        ranks_Q, ranks = np.linspace(0, 1, len(self._quantiles_Q_F)), []
-        for values_N, quantiles_Q in zip(features_N_F.T, self._quantiles_Q_F.T, strict=True):
+        ranks_Q, ranks = np.linspace(0, 1, len(self.quantiles_Q_F)), []
+        for values_N, quantiles_Q in zip(features_N_F.T, self.quantiles_Q_F.T, strict=True):
             from_above_N = -np.interp(-values_N, -quantiles_Q[::-1], -ranks_Q[::-1])
             ranks_N = 0.5 * (np.interp(values_N, quantiles_Q, ranks_Q) + from_above_N)
             ranks_N[values_N + AT_THE_END > quantiles_Q[-1]] = 1
             ranks_N[values_N - AT_THE_END < quantiles_Q[0]] = 0
             ranks.append(ranks_N)
         return ndtri(np.column_stack(ranks)).clip(-FARTHEST, FARTHEST)
-
-    def state(self) -> np.ndarray:
-        """Return the quantiles (Q, F) for :meth:`from_state`."""
-        return self._quantiles_Q_F
-
-    @classmethod
-    def from_state(cls, quantiles_Q_F: np.ndarray) -> NormalizedFeatures:
-        """Return the normalization of a :meth:`state`."""
-        normalized = cls()
-        normalized._quantiles_Q_F = quantiles_Q_F
-        return normalized
 
 
 @dataclass(frozen=True)
@@ -85,7 +73,6 @@ class PairClassifier:
         self._causes = [GPC((ABSENT, PRESENT), settings, *axes, concept) for concept in CONCEPTS]
 
     def fit(self, features_N_F: np.ndarray, failed_N: np.ndarray, causes_N_3: np.ndarray) -> PairClassifier:
-        """Learn from the descriptors, failures and causes of samples that are nominal or failed."""
         inputs_N_F = self.normalized.fit(features_N_F)(features_N_F)
         self._failure.fit(inputs_N_F, np.where(failed_N, FAILED, NOMINAL))
         for gpc, present_N in zip(self._causes, causes_N_3.T, strict=True):
@@ -130,18 +117,18 @@ class PairClassifier:
         for gpc, state in zip(self._causes, causes, strict=True):
             if np.array_equal(gpc.learned_N_d, self._failure.learned_N_d):
                 state["labelled"] = failure["labelled"]
-        trees = {"trees": [trees.state() for trees in self._trees]} if self._trees else {}
+        trees = {"trees": [vars(trees) for trees in self._trees]} if self._trees else {}
         usual = {"usual_distance": self.usual_distance}
-        return {"quantiles": self.normalized.state(), "failure": failure, "causes": causes, **usual, **trees}
+        return {"quantiles": self.normalized.quantiles_Q_F, "failure": failure, "causes": causes, **usual, **trees}
 
     @classmethod
     def from_state(cls, state: dict) -> PairClassifier:
-        """Return the classifier of a :meth:`state`."""
         made = cls.__new__(cls)
-        made.normalized = NormalizedFeatures.from_state(state["quantiles"])
+        made.normalized = NormalizedFeatures()
+        made.normalized.quantiles_Q_F = state["quantiles"]
         made._failure = GPC.from_state(state["failure"])
         made._causes = [GPC.from_state(part) for part in state["causes"]]
-        made._trees = [BoostedQuestion.from_state(part) for part in state.get("trees", ())]
+        made._trees = [BoostedQuestion(**part) for part in state.get("trees", ())]
         if "usual_distance" in state:  # added by version 5
             made.usual_distance = state["usual_distance"]
         return made

@@ -120,13 +120,6 @@ def require_fitting(subject: str, distances_m: Sequence[float], diameters_m: Seq
         raise InputError(subject, f"their points lie {off} from the models in the annotated poses, {limit}", REMEDY)
 
 
-def points_on_model(instances: Instances, objects: ObjectClouds) -> np.ndarray:
-    """Return the median distance (I,) in meters of the points of each instance from its model."""
-    trees = {index: cKDTree(objects.points(index)) for index in np.unique(instances.object_index)}
-    poses = zip(instances.object_index, instances.T_camera_object_true, strict=True)
-    return np.array([median_distance(trees[index], T, instances.cloud_m(i)) for i, (index, T) in enumerate(poses)])
-
-
 def read_instances(
     datasets: Mapping[str, tuple[Dataset, list[Frame], dict[int, CenteredModel]]],
     objects: ObjectClouds,

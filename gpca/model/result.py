@@ -155,14 +155,14 @@ class ResultJudge:
 
     def state(self) -> dict[str, object]:
         """Return arrays and trees for :meth:`from_state`."""
-        trees = {"trees": self.trees.state()} if self.trees else {}
+        trees = {"trees": vars(self.trees)} if self.trees else {}
         return {"weights": self.weights, "error_weights": self.error_weights, **trees}
 
     @classmethod
     def from_state(cls, state: Mapping) -> ResultJudge:
         """Return the judge of a :meth:`state`; before there were trees, it had none."""
         trees = state.get("trees")
-        return cls(state["weights"], state["error_weights"], trees and BoostedQuestion.from_state(trees))
+        return cls(state["weights"], state["error_weights"], trees and BoostedQuestion(**trees))
 
     def error(self, evidence: Evidence) -> np.ndarray:
         """Return the expected errors (N,), diameters."""

@@ -99,10 +99,7 @@ def thinned(registrations: Registrations, points: tuple[int, int], *axes: object
 
 
 def of_unseen_objects(registrations: Registrations, folds: int, source: str, seed: int) -> Registrations:
-    """Return training samples of most objects, and all samples of the other objects as test samples.
-
-    Families are in folds that a file names, or are dealt into `folds`; a seed leaves out the fold of its number.
-    """
+    """Return training samples of most families, and as test samples all of the others: a fold, which the seed names."""
     is_unseen = unseen(registrations.fold, seed)
     if is_unseen is None:
         families = generator(source, "folds").permutation(np.unique(registrations.cluster))
@@ -117,14 +114,11 @@ def of_unseen_objects(registrations: Registrations, folds: int, source: str, see
 
 
 def relabeled(control: str, train: Registrations, *axes: object) -> Registrations:
-    """Return training samples with the labels of a control: a share names another concept, or all are shuffled.
-
-    Each concept's samples then get every label equally often, or a cluster would keep a most frequent label.
-    """
+    """Return training samples with the labels of a control: a share names another concept, or all are shuffled."""
     random = generator(*axes, "labels", control)
     concept = train.concept.copy()
     if control == "shuffled":
-        for name in CONCEPTS:
+        for name in CONCEPTS:  # each gets every label equally often, or a cluster would keep a most frequent label
             rows = random.permutation(np.flatnonzero(train.concept == name))
             concept[rows] = np.resize(random.permutation(CONCEPTS), len(rows))
     else:

@@ -84,41 +84,26 @@ def read_hard(paths: Sequence[Path], reenactments: Sequence[Path], seed: int) ->
 
 @dataclass(frozen=True)
 class ControlRun:
-    """The parts that all controls of one source and seed share.
-
-    Attributes:
-        backbone: that of the encoder.
-        uncertainty: settings of Monte-Carlo ICP, for covariances; its ICP is that of the registrations.
-        embed: registrations and the name of their source -> embeddings and head's logits by the paper's encoder.
-        embeddings: ``embedding`` and ``head_logits`` by the paper's encoder, and by that of each control that has one.
-        hard: the samples of that control, if it is among them.
-        other_hard: those of the other sources, whose training samples are learned from too.
-    """
+    """The parts that all controls of one source and seed share."""
 
     source: str
     seed: int
     settings: samples.ControlSettings
-    backbone: str
-    uncertainty: UncertaintySettings
+    backbone: str  # of the encoder
+    uncertainty: UncertaintySettings  # of Monte-Carlo ICP, for covariances; its ICP is that of the registrations
     rivals: Mapping[str, ExplainerEntry]
-    embed: Embed
+    embed: Embed  # by the paper's encoder
+    # ``embedding`` and ``head_logits`` by the paper's encoder, and by that of each control that has one
     embeddings: Mapping[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
-    hard: Registrations | None = None
-    other_hard: Sequence[Registrations] = ()
+    hard: Registrations | None = None  # the samples of that control
+    other_hard: Sequence[Registrations] = ()  # those of the other sources, whose training samples are learned from too
 
     def run(self, registrations: Registrations, others: Mapping[str, Registrations]) -> pd.DataFrame:
-        """Rows of a prediction file after `LABELS`, by control, explainer and test sample; ``tested`` is its source.
-
-        A control that the registrations do not admit has no rows, and is named on stderr.
-
-        Args:
-            registrations: those of the source, by the paper's protocol.
-            others: those of the other sources, for transfer.
-        """
+        """Rows of a prediction file after `LABELS`, under each control that the registrations, the paper's, admit."""
         plain = self._described(replace(registrations, attached=dict(self.embeddings[PAPER])), self.source)
-        embeds = self._learned(PAPER, plain)
+        embeds = self._learned(plain)
         plain = _attached(embeds, plain)
-        tests = self._tests(PAPER, plain)
+        tests = {(PAPER, self.source): plain.subset(plain.rows("test"))}
         admitted = []
         for control in self.settings.controls:
             why = samples.left_out(control, registrations, self.settings, self.backbone)
@@ -134,27 +119,30 @@ class ControlRun:
             for name, other in others.items():
                 test = self._embedded(other.subset(other.rows("test")), name)
                 tests[TRANSFER, name] = _attached(embeds, self._described(test, name))
-        frames = list(self._explained(PAPER, plain, tests, self.rivals))
+        frames = list(self._explained(PAPER, plain, tests))
         for control in admitted:
             if control != TRANSFER:
                 changed = self._changed(control, plain, embeds)
-                frames += self._explained(control, changed, self._tests(control, changed), self.rivals)
+                asked: dict[tuple[str, str], Registrations] = {
+                    (control, self.source): changed.subset(changed.rows("test"))
+                }
+                frames += self._explained(control, changed, asked)
         return pd.concat(frames, ignore_index=True)
 
     def explain_hard(self, name: str) -> tuple[Attribution, float]:
         """Attribution of the hard test samples by one explainer, and its seconds for each of them."""
         assert self.hard is not None
-        changed = self._changed(HARD, self.hard, {})
+        changed = self._changed(HARD, self.hard, [])
         explainer, test = self.rivals[name].made(), changed.subset(changed.rows("test"))
         explainer.fit(_learned_from(self.rivals[name], changed.subset(changed.rows("train"))))
         attribution = answer_of(explainer, test.without_labels())
         return attribution, float(attribution.seconds_N.mean())
 
-    def _changed(self, control: str, plain: Registrations, embeds: Mapping[str, Attach]) -> Registrations:
+    def _changed(self, control: str, plain: Registrations, embeds: list[Attach]) -> Registrations:
         """Registrations under a control, with all that explainers read attached."""
         if control == HARD and self.hard is not None:
             changed = self._described(self._with_others(self.hard), self.source)
-            return _attached(self._learned(control, changed), changed)
+            return _attached(self._learned(changed), changed)
         changed = samples.variant(control, plain, self.source, self.seed, self.settings, self.uncertainty.icp)
         if control == UNSEEN:  # the measurements of each stay
             changed = replace(changed, attached={**changed.attached, **self.embeddings[control]})
@@ -162,36 +150,25 @@ class ControlRun:
             changed = self._described(replace(changed, attached=dict(self.embeddings[control])), self.source)
         elif control == "reversed":
             return _attached(embeds, self._described(self._embedded(changed, self.source), self.source))
-        return _attached(self._learned(control, changed), changed) if control in RETRAINED else changed
+        return _attached(self._learned(changed), changed) if control in RETRAINED else changed
 
     def _with_others(self, hard: Registrations) -> Registrations:
-        """Join hard samples with those that other sources learn from, but of no family that is tested.
-
-        The others have no embedding, which would be by another encoder: it is NaN.
-        """
+        """Join hard samples with those that other sources learn from, but of no family that is tested."""
         own = replace(hard, attached={**hard.attached, **self.embeddings[HARD]})
         if not self.other_hard:
             return own
         test, parts = own.subset(own.rows("test")), [own.subset(own.rows("train"))]
         for other in self.other_hard:
             train = other.subset(other.rows("train"))
+            # They have no embedding, which would be by another encoder.
             unknown = {name: np.full((len(train), *own_S.shape[1:]), np.nan) for name, own_S in own.attached.items()}
             parts.append(replace(train, attached={**unknown, **train.attached}))
         return Registrations.joined([joined_without(test.cluster, parts), test])
 
-    def _learned(self, control: str, registrations: Registrations) -> dict[str, Attach]:
+    def _learned(self, registrations: Registrations) -> list[Attach]:
         """Functions that attach embeddings by the rivals' encoders, trained on the training samples."""
-        train = registrations.subset(registrations.rows("train"))
-        embeds = {}
-        for name, rival in self.rivals.items():
-            explainer = rival.made()
-            if isinstance(explainer, Encoding):
-                embeds[name] = explainer.learn_encoder(train)
-        return embeds
-
-    def _tests(self, control: str, changed: Registrations) -> dict[tuple[str, str], Registrations]:
-        """Test samples by control and source."""
-        return {(control, self.source): changed.subset(changed.rows("test"))}
+        train, made = registrations.subset(registrations.rows("train")), (each.made() for each in self.rivals.values())
+        return [explainer.learn_encoder(train) for explainer in made if isinstance(explainer, Encoding)]
 
     def _embedded(self, registrations: Registrations, source: str) -> Registrations:
         h_S_d, logits_S_C = self.embed(registrations, source)
@@ -206,11 +183,7 @@ class ControlRun:
         return described_for(self.rivals, described)
 
     def _explained(
-        self,
-        control: str,
-        learned: Registrations,
-        tests: Mapping[tuple[str, str], Registrations],
-        rivals: Mapping[str, ExplainerEntry],
+        self, control: str, learned: Registrations, tests: Mapping[tuple[str, str], Registrations]
     ) -> Iterator[pd.DataFrame]:
         """Yield each explainer's predictions for the test samples after it has learned from the training samples.
 
@@ -223,7 +196,7 @@ class ControlRun:
             train, asked = _dealt(whole, part, parts), {key: _dealt(test, part, parts) for key, test in tests.items()}
             if control in RELABELED:
                 train = samples.relabeled(control, train, *axes, *([part] if control == "shuffled" else []))
-            for name, rival in rivals.items():
+            for name, rival in self.rivals.items():
                 explainer = rival.made()
                 if control in RELABELED and getattr(explainer, "trained_with_encoder", False):
                     continue
@@ -231,11 +204,8 @@ class ControlRun:
                     continue
                 explainer.fit(_learned_from(rival, train))
                 for (name_of_test, source), test in asked.items():
-                    attribution = answer_of(explainer, test.without_labels())
-                    frame = prediction_frame(test, attribution)
-                    for i, entry in enumerate(zip(LABELS, (name_of_test, source, name), strict=True)):
-                        frame.insert(i, *entry)
-                    yield frame
+                    labels = dict(zip(LABELS, (name_of_test, source, name), strict=True))
+                    yield prediction_frame(test, answer_of(explainer, test.without_labels()), **labels)
 
 
 def _learned_from(rival: ExplainerEntry, train: Registrations) -> Registrations:
@@ -245,8 +215,8 @@ def _learned_from(rival: ExplainerEntry, train: Registrations) -> Registrations:
     return train.subset(np.flatnonzero(np.isfinite(train.embedding).all(axis=1)))
 
 
-def _attached(embeds: Mapping[str, Attach], registrations: Registrations) -> Registrations:
-    return reduce(lambda registered, embed: embed(registered), embeds.values(), registrations)
+def _attached(embeds: list[Attach], registrations: Registrations) -> Registrations:
+    return reduce(lambda registered, embed: embed(registered), embeds, registrations)
 
 
 def _dealt(registrations: Registrations, part: int, parts: int) -> Registrations:

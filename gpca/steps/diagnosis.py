@@ -111,8 +111,7 @@ def explained(
 ) -> Attribution:
     """Let an explainer learn from the training rows and explain all, and count the runs of ICP that it needs.
 
-    `read` has what the explainer reads of the causes of the file `path`; `others` are the same files of other sources,
-    whose training rows are learned from too unless a family of theirs is tested.
+    `read` has what it reads of the file `path`; of `others`, families that are not tested are learned from too.
     """
     explainer = entry.made(*(causes.registrations.axes or ()), **settings)
     registrations = with_what_it_reads(labeled(causes), entry.reads, read)
@@ -123,9 +122,8 @@ def explained(
     fit(explainer, entry, learned, further, registrations.cluster[causes.rows("test")])
     starts = causes.T_target_source_runs.shape[1]
     calls = icp_calls(entry.sees, starts, remedies, reenactment.calls(starts) if reenactment else 0)
-    return replace(
-        answer_of(explainer, observed_only(registrations), LABELS), icp_calls_N=np.full(len(registrations), calls)
-    )
+    answer = answer_of(explainer, observed_only(registrations), LABELS)
+    return replace(answer, icp_calls_N=np.full(len(registrations), calls))
 
 
 def fit(
@@ -166,11 +164,9 @@ def with_what_it_reads(registrations: Registrations, reads: str, path: Path | No
 
 
 class World:
-    """Registrations that explainers which learned from objects are asked about: in depth frames, or of scans.
+    """Registrations that explainers are asked about which learned from objects, or from all its folds (S,) but one.
 
-    `read` gives them with descriptors or re-enactments attached, by an explainer's `reads`; explainers that learn from
-    this world do so from all folds (S,) but the one that they are asked about. With `apart`, no family of objects is
-    learned from that explainers are asked about.
+    `read` attaches what an explainer reads. With `apart`, no family of objects is learned from that is asked about.
     """
 
     def __init__(
@@ -235,21 +231,20 @@ class World:
         for training, asked in self.prepare(name, learned_from):
             parts = [(np.arange(len(asked)), training)]
             if training is asked:  # one fold is asked about, and the labeled rows of the others are learned from
-                labeled_S = asked.concept != BORDERLINE
-                fold_S = np.asarray(self._fold_S)
+                labeled_S, fold_S = asked.concept != BORDERLINE, np.asarray(self._fold_S)
                 folds = [fold_S == fold for fold in np.unique(fold_S)]
                 parts = [(np.flatnonzero(in_S), asked.subset(np.flatnonzero(labeled_S & ~in_S))) for in_S in folds]
-            answers = []
+            scores_S_C, abstained_S = np.empty((len(asked), len(LABELS))), np.empty(len(asked), bool)
             for rows, learned in parts:
                 if self._fold_S is not None and len(np.unique(learned.concept)) < FEWEST_LABELS:
                     return None
                 explainer = entry.made(*self._axes, **settings)
                 others = (self._files["further"], self._left_out) if learned_from == OBJECTS else ((), ())
                 fit(explainer, entry, [learned], *others)
-                answers.append(answer_of(explainer, observed_only(asked.subset(rows)), LABELS))
-            order = np.argsort(np.concatenate([rows for rows, _ in parts]))
-            all_scores.append(np.concatenate([answer.scores_N_C for answer in answers])[order])
-            all_abstained.append(np.concatenate([answer.abstained_N for answer in answers])[order])
+                answer = answer_of(explainer, observed_only(asked.subset(rows)), LABELS)
+                scores_S_C[rows], abstained_S[rows] = answer.scores_N_C, answer.abstained_N
+            all_scores.append(scores_S_C)
+            all_abstained.append(abstained_S)
         return Attribution.of_scores(
             LABELS,
             np.mean(all_scores, axis=0),

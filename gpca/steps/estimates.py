@@ -5,8 +5,8 @@ References are what further registrations of the same situation find, where the 
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from functools import cached_property, partial
+from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 from time import perf_counter
 
@@ -29,6 +29,7 @@ from gpca.pairs.perturbation import within_half_space
 from gpca.process.progress import progress
 from gpca.rigid import exp, inverse, point_jacobians, transform
 from gpca.seeds import generator, seed_of
+from gpca.steps.registration_trials import timed
 from gpca.uncertainty import estimates
 from gpca.uncertainty.estimates import KINDS, EstimatorPairSettings, Kind
 from gpca.uncertainty.estimators.analytic import sample
@@ -53,19 +54,6 @@ LEVEL = 0.95  # of the region whose coverage is counted
 Clouds = Iterator[tuple[np.ndarray, np.ndarray]]  # (N, 3) of sources and (P, 3) of targets
 SETTINGS = ICPSettings("point_to_point", CORRESPONDENCE_DISTANCE, MAX_ITERATIONS)  # to points and to planes
 AT_ONCE = 50  # point-to-plane runs that go one step at a time together
-
-
-@dataclass(frozen=True)
-class Reference:
-    """The results of one kind: twists (n, 6) about the pose; none where too few runs found any correspondence."""
-
-    twists: np.ndarray = field(default_factory=lambda: np.empty((0, 6)))
-    seconds: float = 0.0
-
-    @cached_property
-    def covariance_6_6(self) -> np.ndarray | None:
-        """Σ about the mean of the results."""
-        return np.cov(self.twists, rowvar=False) if len(self.twists) else None
 
 
 @dataclass(frozen=True)
@@ -137,7 +125,8 @@ class EstimatedRow:
     columns: dict[str, object]  # of every row about it: sample, object, method, errors
     registered: RegisteredPair
     true_twist: np.ndarray  # (6,) of the true pose about that of the registration, the nearest of symmetric ones
-    references: Mapping[str, Reference]  # by kind
+    # By kind: twists (n, 6) of the results about the pose, none where too few runs found any correspondence; seconds
+    references: Mapping[Kind, tuple[np.ndarray, float]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,14 +157,14 @@ class DrawnCauses:
             "inlier_rmse": registered.outcome.inlier_rmse,
             "fitness": registered.outcome.fitness,
         }
-        references: dict[str, Reference] = {}
+        references: dict[Kind, tuple[np.ndarray, float]] = {}
         for kind in KINDS:
             started = perf_counter()
             try:
                 twists_n_6 = draw_twists(kind, registered, redraws, settings.repeats, *self._axes(method), "reference")
             except FailedEstimate:
                 twists_n_6 = np.empty((0, 6))
-            references[kind] = Reference(twists_n_6, perf_counter() - started)
+            references[kind] = twists_n_6, perf_counter() - started
         return EstimatedRow(columns, registered, true_twist(registered, T_true, judge, MOVED), references)
 
     def example(self, row: int, method: str, settings: EstimatorPairSettings) -> Example:
@@ -212,7 +201,6 @@ class DrawnCauses:
 
 
 def run(job: Job) -> None:
-    """Ask every estimator, seed by seed."""
     settings = EstimatorPairSettings(**job.section("estimator_pairs"), failed=job.section("success")["error"])
     drawn_by = CauseSettings.from_dict(job.section("causes"), job.section("icp"))
     estimators = job.by_name("estimators", job.estimators)
@@ -248,15 +236,14 @@ def try_estimators(
         for row in progress(spaced(tested, wanted), title):
             case = situations.case(row, method, settings)
             cases.append(case)
-            for kind, reference in case.references.items():
-                lost = "too few of the reference's runs found a correspondence"
-                answer = CovarianceEstimate(reference.covariance_6_6, "" if len(reference.twists) else lost)
-                judgment = judged(case, answer, settings.floor) | {"seconds": reference.seconds}
-                records.setdefault(f"reference_{kind}", []).append(judgment)
-            for name, estimate in trained.items():
-                started = perf_counter()
-                answer = estimate(case.registered)
-                seconds = perf_counter() - started
+            answers = {}
+            for kind, (twists_n_6, seconds) in case.references.items():
+                answer = CovarianceEstimate(None, "too few of the reference's runs found a correspondence")
+                if len(twists_n_6):
+                    answer = CovarianceEstimate(np.cov(twists_n_6, rowvar=False), "")
+                answers[f"reference_{kind}"] = answer, seconds
+            answers |= {name: timed(estimate, case.registered) for name, estimate in trained.items()}
+            for name, (answer, seconds) in answers.items():
                 records.setdefault(name, []).append(judged(case, answer, settings.floor) | {"seconds": seconds})
     return {name: pd.DataFrame(of_estimator) for name, of_estimator in records.items()}, cases
 
@@ -270,17 +257,19 @@ def judged(case: EstimatedRow, answer: CovarianceEstimate, floor: float) -> dict
     """Row of an estimate; numbers that it lacks are NaN."""
     numbers = dict.fromkeys(estimates.JUDGED, np.nan)
     if (sigma_6_6 := answer.covariance_6_6) is not None:
-        e_6 = case.true_twist
-        numbers["error_ratio"] = float(e_6 @ e_6 / np.trace(sigma_6_6 + floor * np.eye(6)))
-        numbers["mahalanobis"] = mahalanobis(e_6, sigma_6_6, floor)
-        points = transform(case.registered.T_target_source, case.registered.pair.source)
-        numbers["spread"] = predicted_spread(points, sigma_6_6)
-        for kind, reference in case.references.items():
-            numbers |= {f"{name}_{kind}": value for name, value in compared(sigma_6_6, reference, floor).items()}
+        e_6, floored_6_6 = case.true_twist, sigma_6_6 + floor * np.eye(6)
+        numbers["error_ratio"] = float(e_6 @ e_6 / np.trace(floored_6_6))
+        numbers["mahalanobis"] = float(e_6 @ np.linalg.solve(floored_6_6, e_6))  # χ² with six degrees where it is right
+        # Root mean square distance by which points would move: √ mean tr(J Σ Jᵀ).
+        jacobians_N_3_6 = point_jacobians(transform(case.registered.T_target_source, case.registered.pair.source))
+        squares_N = np.einsum("nij,jk,nik->n", jacobians_N_3_6, sigma_6_6, jacobians_N_3_6)
+        numbers["spread"] = float(np.sqrt(max(squares_N.mean(), 0.0)))
+        for kind, (twists_n_6, _) in case.references.items():
+            numbers |= {f"{name}_{kind}": value for name, value in compared(sigma_6_6, twists_n_6, floor).items()}
     return {**case.columns, "failure": answer.failure} | numbers | estimates.covariance_columns(sigma_6_6)
 
 
-def compared(sigma_6_6: np.ndarray, reference: Reference, floor: float) -> dict[str, float]:
+def compared(sigma_6_6: np.ndarray, twists_n_6: np.ndarray, floor: float) -> dict[str, float]:
     """Return how a covariance Σ fits the results of a reference about their mean, which have the covariance S.
 
     KL divergences of the 3×3 blocks (nats), tr S / tr Σ, tr Σ⁻¹S, and the share of the results within the 95 % region
@@ -288,10 +277,11 @@ def compared(sigma_6_6: np.ndarray, reference: Reference, floor: float) -> dict[
     """
     from scipy.stats import chi2
 
-    if (S_6_6 := reference.covariance_6_6) is None:
+    if not len(twists_n_6):
         return {}
+    S_6_6 = np.cov(twists_n_6, rowvar=False)
     floored_6_6, expected_6_6 = (matrix + floor * np.eye(6) for matrix in (sigma_6_6, S_6_6))
-    away_n_6 = reference.twists - reference.twists.mean(axis=0)
+    away_n_6 = twists_n_6 - twists_n_6.mean(axis=0)
     squares_n = np.einsum("ni,in->n", away_n_6, np.linalg.solve(floored_6_6, away_n_6.T))
     return {
         "kl_rotation": float(divergence(S_6_6[:3, :3], sigma_6_6[:3, :3], floor)),
@@ -300,15 +290,3 @@ def compared(sigma_6_6: np.ndarray, reference: Reference, floor: float) -> dict[
         "mahalanobis": float(np.trace(np.linalg.solve(floored_6_6, expected_6_6))),
         "covered": float((squares_n <= chi2.ppf(LEVEL, 6)).mean()),
     }
-
-
-def mahalanobis(true_twist_6: np.ndarray, covariance_6_6: np.ndarray, floor: float) -> float:
-    """Return eᵀ (Σ + εI)⁻¹ e, of χ² with six degrees where the covariance is right."""
-    return float(true_twist_6 @ np.linalg.solve(covariance_6_6 + floor * np.eye(6), true_twist_6))
-
-
-def predicted_spread(points_N_3: np.ndarray, covariance_6_6: np.ndarray) -> float:
-    """Root mean square distance by which points would move: √ mean tr(J Σ Jᵀ), in their unit."""
-    jacobians_N_3_6 = point_jacobians(points_N_3)
-    squares = np.einsum("nij,jk,nik->n", jacobians_N_3_6, covariance_6_6, jacobians_N_3_6)
-    return float(np.sqrt(max(squares.mean(), 0.0)))

@@ -6,7 +6,6 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from gpca.alignment.methods.registry import make_method
 from gpca.attribution.predictions import prediction_frame
 from gpca.classifier.scores import Attribution
 from gpca.encoders.registry import EncoderSettings
@@ -22,10 +21,9 @@ from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations, ragged
 from gpca.pairs.judge import Judges
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.process.progress import progress
 from gpca.rigid import scale_translation, transform
 from gpca.settings import Bounds, Count, Distinct, read_settings
-from gpca.steps.registration_trials import pair_to_register
+from gpca.steps.registration_trials import outcomes_by
 from gpca.uncertainty.designs import ADDITIVE_KNOBS
 from gpca.uncertainty.estimators.registry import make_estimator
 from gpca.uncertainty.estimators.substitute import OBSERVED, KnobbedRegistrar
@@ -93,10 +91,7 @@ class Exchange:
     embed: Embed
 
     def run(self, registrations: Registrations, judges: Judges) -> Frame:
-        """Return predictions of each explainer: `LABELS`, the columns of a prediction file, `FAILURE`.
-
-        The method ``learnt_from`` registered the training pairs, ``asked_of`` the test pairs; of estimators, both.
-        """
+        """Return predictions after `LABELS`, which name what registered or estimated training and test pairs."""
         import pandas as pd
 
         by_estimator = {name: rival for name, rival in self.rivals.items() if rival.reads.startswith("uncertainty/")}
@@ -121,9 +116,9 @@ class Exchange:
                 explainer.fit(train.subset(train.rows("train")))
                 for asked_of, (tested, failure_S) in registered.items():
                     test = tested.subset(tested.rows("test"))
-                    frame = prediction_frame(test, answer_of(explainer, test.without_labels()))
-                    labels = METHOD, learnt_from, asked_of, explainer_name
-                    yield labeled(frame, labels, failure_S[tested.rows("test")])
+                    labels = dict(zip(LABELS, (METHOD, learnt_from, asked_of, explainer_name), strict=True))
+                    frame = prediction_frame(test, answer_of(explainer, test.without_labels()), **labels)
+                    yield frame.assign(**{FAILURE: failure_S[tested.rows("test")]})
 
     def _by_estimators(
         self, registrations: Registrations, rivals: Mapping[str, ExplainerEntry], judges: Judges
@@ -161,7 +156,8 @@ class Exchange:
                     )
                     scores_S_C[estimated], abstained_S[estimated] = attributed.scores_N_C, attributed.abstained_N
                 attribution = Attribution.of_scores(CONCEPTS, scores_S_C, seconds=0.0, abstained_N=abstained_S)
-                yield labeled(prediction_frame(test, attribution), (ESTIMATOR, estimator, estimator, name), failure_S)
+                labels = dict(zip(LABELS, (ESTIMATOR, estimator, estimator, name), strict=True))
+                yield prediction_frame(test, attribution, **labels).assign(**{FAILURE: failure_S})
 
 
 def first(registrations: Registrations, split: str, samples: int) -> np.ndarray:
@@ -169,27 +165,13 @@ def first(registrations: Registrations, split: str, samples: int) -> np.ndarray:
     return np.flatnonzero((registrations.split == split) & (registrations.sample < samples))
 
 
-def labeled(frame: Frame, labels: tuple[str, ...], failure_S: np.ndarray) -> Frame:
-    """Columns of a prediction file between `LABELS` and `FAILURE`."""
-    for column, (name, label) in enumerate(zip(LABELS, labels, strict=True)):
-        frame.insert(column, name, label)
-    frame[FAILURE] = failure_S
-    return frame
-
-
 def registered_by(
     registrations: Registrations, methods: Mapping[str, Mapping], source: str, seed: int, points: int
 ) -> dict[str, tuple[Registrations, np.ndarray]]:
     """Return the registrations by each method, and why each failed (S,), empty if it did not."""
-    made = {name: make_method(name, entry) for name, entry in methods.items()}
-    outcomes: dict[str, list] = {name: [] for name in made}
-    for row in progress(range(len(registrations)), f"registrations by other methods of {source}, seed {seed}"):
-        pair = pair_to_register(registrations, row, source, seed, points)
-        for name, method in made.items():
-            outcomes[name].append(method(pair))
     targets = [registrations.target(row) for row in range(len(registrations))]
     by_method = {}
-    for name, outcomes_S in outcomes.items():
+    for name, outcomes_S in outcomes_by(methods, registrations, source, seed, points).items():
         poses = [outcome.T_target_source for outcome in outcomes_S]
         clouds = [transform(T, registrations.source(row)).astype(np.float32) for row, T in enumerate(poses)]
         moved: dict[str, Any] = ragged(clouds, targets)

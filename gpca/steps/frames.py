@@ -57,15 +57,12 @@ def scenes(job: Job) -> None:
             else:
                 models.append(model)
         if not models:
-            which = "no model of them" if is_all else "no model of an object that is not tested"
-            choice = "" if is_all else ".objects to all, or virtual"
-            remedy = f"set real_world.virtual{choice} to null, or name other datasets"
-            raise InputError("real_world.datasets", f"{which} can be rendered on a table", remedy)
+            lacking = f"no model of {'them' if is_all else 'an object that is not tested'} can be rendered on a table"
+            raise InputError("real_world.datasets", lacking, "set real_world.virtual to null, or name other datasets")
         write_scenes(models, job.source, replace(settings, families=()), job.out)
 
 
 def _datasets(job: Job) -> dict[str, Dataset]:
-    """The datasets of a job, or the scenes that were rendered in their place."""
     from gpca.frames.dataset import datasets_of
 
     places = job.get("scenes"), job.get("splits"), job.settings.get("role", EVALUATION)
@@ -73,14 +70,12 @@ def _datasets(job: Job) -> dict[str, Dataset]:
 
 
 def _inputs(job: Job, *files: Path) -> list[Path]:
-    """These files, and those of the datasets of a job."""
     from gpca.frames.dataset import files_behind
 
     return [*files, *files_behind(job.settings.get("datasets"), job.data_dir, job.get("scenes"))]
 
 
 def _instances(job: Job, name: str) -> tuple[Instances, ObjectClouds]:
-    """Instances of that name, and the objects that they show."""
     from gpca.frames.instances import Instances
 
     return Instances.load(job.instances, (name, None)), ObjectClouds.load(job.objects, name)
@@ -90,7 +85,7 @@ def instances(job: Job) -> None:
     """Read models and frames of BOP datasets -> instances with initial poses, and the models' canonical clouds."""
     from gpca.frames.dataset import distinct_surfaces, read_models, with_shared_models
     from gpca.frames.initial_pose import InitialPoseSettings
-    from gpca.frames.instances import points_on_model, read_instances
+    from gpca.frames.instances import read_instances
 
     datasets, inputs = _datasets(job), _inputs(job)
     initial_pose = InitialPoseSettings(**job.settings.get("initial_pose", {}))
@@ -104,13 +99,6 @@ def instances(job: Job) -> None:
         named = job.get("name", job.source)
         objects.save(job.objects, named)
         instances.save(job.instances, (named, None))
-    for name in datasets:
-        medians_m = points_on_model(instances, objects)[instances.dataset == name]
-        print(
-            f"{name}: {len(medians_m)} instances; median distance to the model under the true pose: "
-            f"{1e3 * medians_m.mean():.2f} mm on average, {1e3 * medians_m.max():.2f} mm at most",
-            file=sys.stderr,
-        )
 
 
 def frame_registrations(job: Job) -> None:
@@ -159,19 +147,16 @@ def _errors(
     causes: Causes, objects: ObjectClouds, axes: tuple[str, int], settings: FrameCauseSettings
 ) -> dict[str, np.ndarray]:
     """Return the errors (S,) of each other method from the same starts, in diameters; infinite where it fails."""
-    from gpca.alignment.methods.registry import make_method
     from gpca.pairs.judge import Judges
-    from gpca.process.progress import progress
-    from gpca.steps.registration_trials import pair_to_register
+    from gpca.steps.registration_trials import outcomes_by
 
     registrations, judges = causes.registrations, Judges(objects, f"objects of {axes[0]}")
-    made = {name: make_method(name, {}) for name in settings.methods}
-    errors = {name: np.full(len(causes), np.inf) for name in made}
-    for row in progress(range(len(causes)), f"other methods on {axes[0]}, seed {axes[1]}"):
-        pair, judge = pair_to_register(registrations, row, *axes, settings.points), judges.of(registrations, row)
-        for name, method in made.items():
-            if (outcome := method(pair)).converged:
-                T_true = registrations.T_target_source("true", row)
+    outcomes = outcomes_by({name: {} for name in settings.methods}, registrations, *axes, settings.points)
+    errors = {name: np.full(len(causes), np.inf) for name in outcomes}
+    for name, outcomes_S in outcomes.items():
+        for row, outcome in enumerate(outcomes_S):
+            if outcome.converged:
+                judge, T_true = judges.of(registrations, row), registrations.T_target_source("true", row)
                 errors[name][row] = judge(outcome.T_target_source, T_true)["add_relative"]
     return errors
 

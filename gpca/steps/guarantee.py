@@ -117,10 +117,7 @@ def scored_as_is(samples: Scored, prediction_files: Sequence[Path]) -> Iterator[
 
 
 def scored_on_frames(frames: Sequence[tuple[Path, Path, Path]], name: str, as_is: Sequence[Scored]) -> Iterator[Scored]:
-    """Yield an explainer's scores of depth frames, and those of the test samples for their calibration.
-
-    Scenes whose true poses were made by ICP are left out. The weights of all starts of an instance add up to one.
-    """
+    """Yield an explainer's scores of depth frames, and those of the test samples for their calibration."""
     for causes_file, sample_file, prediction_file in frames:
         causes, samples = Causes.load(causes_file), read_csv(sample_file, FRAME_COLUMNS, others=ANY)
         predictions = read_predictions(prediction_file, labels=("explainer",))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gpca.active_learning.rounds import make_task, rounds
+from gpca.active_learning.rounds import make_task
 from gpca.active_learning.settings import LOOK_EVERY, ActiveLearningSettings
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
@@ -33,7 +33,7 @@ from gpca.seeds import seed_of_file
 from gpca.settings import read_settings
 from gpca.steps.readings.files import RunFiles, accuracies, diagnostics_of_scores, like_the_training, train_and_test
 from gpca.steps.readings.knobs import accuracies_of_magnitudes, runs_of
-from gpca.steps.readings.labels import NEW, passes_to
+from gpca.steps.readings.labels import NEW, passes_to, until
 from gpca.steps.readings.learners import FITTED, FOREST, SVM, StartedGPC, relevant, svm_scores, to_unit_norm
 from gpca.uncertainty.interventions import MIDDLE, UPPER
 from gpca.uncertainty.settings import UncertaintySettings
@@ -82,7 +82,7 @@ class MeasureSettings:
 
     @classmethod
     def of_job(cls, job: Job) -> MeasureSettings:
-        """Read the sections of the config that a rule gives; ``labels`` changes those of ``active_learning``."""
+        """Read a job's sections, of which ``labels`` changes ``active_learning``."""
         active, uncertainty = job.section("active_learning"), RunFiles(settings=job.settings).uncertainty()
         labels = ActiveLearningSettings.from_dict(active | job.section("labels"))
         return cls(job.section("gpca_paper"), labels, active["target"], uncertainty)
@@ -181,11 +181,10 @@ def values(samples: ReadingSamples, severities: str, choices: Choices, settings:
 def _learner_values(samples: ReadingSamples, choices: Choices) -> Iterator[Value]:
     """Yield accuracies and diagnostics of the forest and the linear SVM, by the scale of their inputs."""
     for joint in _combinations(choices, (SEVERITIES, "inputs")):
-        inputs = joint["inputs"]
+        scale = to_unit_norm if joint["inputs"] == "unit_norm" else np.asarray
 
-        def scaled(registrations: Registrations, inputs: str = inputs) -> Registrations:
-            h_S_d = to_unit_norm(registrations.embedding) if inputs == "unit_norm" else registrations.embedding
-            return replace(registrations, attached={"embedding": h_S_d})
+        def scaled(registrations: Registrations, scale: Callable = scale) -> Registrations:
+            return replace(registrations, attached={"embedding": scale(registrations.embedding)})
 
         train = scaled(train_and_test(like_the_training(samples.sets))[0])
         forest = explainer_entry(FOREST).make(*samples.axes)
@@ -193,8 +192,8 @@ def _learner_values(samples: ReadingSamples, choices: Choices) -> Iterator[Value
         parts = [(name, scaled(part), rows) for name, part, rows in samples.test_sets()]
         h_S_d = np.concatenate([part.embedding for _, part, _ in parts])
         ends = np.cumsum([len(part) for _, part, _ in parts])[:-1]
-        standardized = "standardised" if inputs == "standardised" else "raw"
-        by_svm = np.split(svm_scores(train, h_S_d, "svc", standardized, "platt"), ends)
+        inputs = joint["inputs"] if joint["inputs"] == "standardised" else "raw"
+        by_svm = np.split(svm_scores(train, h_S_d, "svc", inputs, "platt"), ends)
         scored_by = {
             FOREST: {name: (forest.explain(part).scores_N_C, part, rows) for name, part, rows in parts},
             SVM: {name: (scores_S_C, part, rows) for scores_S_C, (name, part, rows) in zip(by_svm, parts, strict=True)},
@@ -240,20 +239,16 @@ def _label_values(
             "random": (replace(settings.labels, batch=RANDOM_ROUND, labels=len(task.pool)), settings.target),
         }
         for strategy, (budget, end) in budgets.items():
-            steps = []  # and the rows of the pool that are labeled then
-            for step, rows in rounds(task.project(gpc), gpc, strategy, budget, *samples.axes, "reading"):
-                steps.append((step, rows))
-                if step["accuracy"] >= end:
-                    break
-            hits = [step["accuracy"] >= settings.target for step, _ in steps]
-            last, at_target = steps[hits.index(True) if any(hits) else -1]  # a lower bound where the target is missed
-            metrics = {"labels_to_target": float(last["labels"]), "reached": float(any(hits))}
-            metrics["final_accuracy"] = float(steps[-1][0]["accuracy"])
+            steps, labeled = until(end, task, gpc, strategy, budget, *samples.axes)
+            hits = [step["accuracy"] >= settings.target for step in steps]
+            last = hits.index(True) if any(hits) else -1  # a lower bound where the target is missed
+            metrics = {"labels_to_target": float(steps[last]["labels"]), "reached": float(any(hits))}
+            metrics["final_accuracy"] = float(steps[-1]["accuracy"])
             if strategy == "bald_kmeans":  # passes over these labels, or all, to a new classifier's target accuracy
                 anew = StartedGPC(with_kernel, joint, *samples.axes, "epochs", NEW)
                 most = with_kernel.iterations
                 looks = [*range(LOOK_EVERY, most, LOOK_EVERY), most]
-                metrics["epochs_at_target"], _ = passes_to(settings.target, anew, task, at_target, looks)
+                metrics["epochs_at_target"], _ = passes_to(settings.target, anew, task, labeled[last], looks)
             for metric, value in metrics.items():
                 yield part_name("labels", joint | {"new_share": new_share}), strategy, metric, NEW, value
 

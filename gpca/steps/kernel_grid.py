@@ -41,7 +41,6 @@ class KernelGrid:
 
 
 def run(job: Job) -> None:
-    """Evaluate the grid, seed by seed."""
     grid = KernelGrid(**fields_of(job.settings, KernelGrid))
     files = job.per_seed("registrations", "embeddings", "out", "predictions")
     for seed, registrations, embeddings, out, predictions in files:
@@ -72,7 +71,7 @@ def evaluate_grid(registrations: Registrations, grid: KernelGrid, source: str, s
                 CONCEPTS, scores_N_C, seconds=0.0, variances_N_C=variances_N_C, bald_N=bald_N
             )
             setting = dict(zip(SETTING, (kernel, rate, iterations), strict=True))
-            predictions.append(prediction_frame(tested, attribution).assign(**setting))
+            predictions.append(prediction_frame(tested, attribution, **setting))
             measured = (
                 np.mean(scores_N_C.argmax(axis=1) == target_N),
                 gpc.elbo(),
@@ -81,5 +80,4 @@ def evaluate_grid(registrations: Registrations, grid: KernelGrid, source: str, s
                 negative_log_likelihood(scores_N_C, target_N),
             )
             rows.append((kernel, rate, iterations, *measured))
-    predicted = pd.concat(predictions, ignore_index=True)
-    return pd.DataFrame(rows, columns=list(GRID_COLUMNS)), predicted[[*SETTING, *predicted.columns.drop([*SETTING])]]
+    return pd.DataFrame(rows, columns=list(GRID_COLUMNS)), pd.concat(predictions, ignore_index=True)

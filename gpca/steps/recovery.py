@@ -124,10 +124,7 @@ def lay_tables(
 def register_situations(
     situations: Mapping[str, Situations], train: int, calibration: int, settings: LoopSettings
 ) -> dict[str, list[Episode]]:
-    """Register situations of all causes, failed or not, from which explainers and the gate learn and are calibrated.
-
-    Episodes 3t to 3t + 2 of a split are of the three causes. The calibration samples are the split ``test``.
-    """
+    """Register situations of the causes in turn, failed or not; what is learned is calibrated on split ``test``."""
     registered: dict[str, list[Episode]] = {"train": [], "test": []}
     for split, count in (("train", train), ("test", calibration)):
         for number in progress(range(count), f"situations of split {split}"):
@@ -145,7 +142,6 @@ def register_situations(
 
 
 def as_samples(registered: Mapping[str, Iterable[Episode]]) -> Registrations:
-    """The registrations of every split as samples of it."""
     records = [
         episode.outcomes[()].record | {"sample": episode.number, "split": split}
         for split, of_split in registered.items()
@@ -154,15 +150,14 @@ def as_samples(registered: Mapping[str, Iterable[Episode]]) -> Registrations:
     return as_registrations(records)[0]
 
 
-def choose_example(rows: Frame) -> int:
-    """Return the episode that is shown: of overlap, solved by a new view by GP-CA's policy, its score the median."""
+def choose_example(rows: Frame) -> Any:
+    """Return the row that is shown: of overlap, solved by a new view by GP-CA's policy, its score the median."""
     shown = "gpca" if (rows["policy"] == "gpca").any() else rows["policy"].iloc[0]
     first = rows[rows["failed"] & (rows["step"] == 1) & (rows["policy"] == shown)]
     for wish in (first["cause"] == "overlap", first["action"] == ACTION, first["recovered"]):
         if (wish := wish.reindex(first.index)).any():
             first = first[wish]
-    ranked = first.sort_values(["score_overlap", "episode"])
-    return int(ranked["episode"].iloc[len(ranked) // 2])
+    return first.sort_values(["score_overlap", "episode"]).iloc[len(first) // 2]
 
 
 def save_example(
@@ -175,9 +170,8 @@ def save_example(
     axes: Axes,
 ) -> None:
     """Write the npz: of the ``first`` and the ``next`` view the image and silhouettes; scores, errors; viewpoints."""
-    episode = next(e for e in episodes if e.number == choose_example(rows))
-    shown = rows[(rows["episode"] == episode.number) & (rows["step"] == 1)]
-    shown = shown[shown["policy"] == "gpca"].iloc[0] if (shown["policy"] == "gpca").any() else shown.iloc[0]
+    shown = choose_example(rows)
+    episode = next(e for e in episodes if e.number == shown["episode"])
     before, after = episode.outcomes[()], episode.take((ACTION,), actions, settings)
     situation = episode.situation
     random = generator(*situation.axes, "action", ACTION)  # the one that the action had

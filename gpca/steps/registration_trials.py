@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from gpca.process.progress import progress
 from gpca.seeds import generator, seed_of
 from gpca.settings import Bounds
 
+Result = TypeVar("Result")
 INITIAL, NO_START = "initial", "none"  # where a registration starts; else, the name of a global method
 SEVERITY_COLUMNS = tuple(f"severity_{name}" for name in SEVERITIES)
 Points = Annotated[int, Bounds(minimum=64, maximum=65536)]
@@ -104,6 +105,19 @@ def pair_to_register(
     ).with_normals(neighbors)
 
 
+def outcomes_by(
+    methods: Mapping[str, Mapping], registrations: Registrations, source: str, seed: int, points: int
+) -> dict[str, list[Outcome]]:
+    """Return the outcome of each method for each registration."""
+    made = {name: make_method(name, entry) for name, entry in methods.items()}
+    outcomes: dict[str, list[Outcome]] = {name: [] for name in made}
+    for row in progress(range(len(registrations)), f"registrations by other methods of {source}, seed {seed}"):
+        pair = pair_to_register(registrations, row, source, seed, points)
+        for name, method in made.items():
+            outcomes[name].append(method(pair))
+    return outcomes
+
+
 def try_each(
     methods: Mapping[str, Mapping],
     start: str,
@@ -147,15 +161,14 @@ def try_each(
     return {name: pd.DataFrame(of_method) for name, of_method in records.items()}
 
 
-def timed(method: Callable[[Pair], Outcome], pair: Pair) -> tuple[Outcome, float]:
-    """Return what a method makes of a pair, and the seconds that it took."""
+def timed(function: Callable[..., Result], *arguments: object) -> tuple[Result, float]:
+    """Return the result of a function, and the seconds that it took."""
     started = perf_counter()
-    outcome = method(pair)
-    return outcome, perf_counter() - started
+    result = function(*arguments)
+    return result, perf_counter() - started
 
 
 def write_trials(trials: Iterable[Frame], outputs: list[Path], timings: list[Path]) -> None:
-    """Write rows of methods, and their seconds in files of their own."""
     for rows, out, seconds in zip(trials, outputs, timings, strict=True):
         write_csv(out, rows.drop(columns="seconds"))
         write_csv(seconds, rows[["sample", "start", "seconds"]])

@@ -1,7 +1,4 @@
-"""Step ``repair_attempts``: what repair and registration methods make of registrations, good and failed (Table XX).
-
-Whether a pose is accepted is decided later, by judges and limits of other families (:mod:`gpca.steps.repair_verdicts`).
-"""
+"""Step ``repair_attempts``: poses for registrations, which :mod:`gpca.steps.repair_verdicts` accepts or not."""
 
 from __future__ import annotations
 
@@ -46,7 +43,6 @@ from gpca.seeds import generator, seed_of
 from gpca.settings import Bounds, Count, read_settings
 
 REPAIR, LIKELIEST, STARTS, MANY_STARTS = "repair", "likeliest", "starts", "many_starts"
-BUILT_IN = (LIKELIEST, STARTS, MANY_STARTS)  # rivals that are no methods of the registry
 TESTS = ("fitness", "inlier_rmse", "trimmed_cost", "spread", "weight")  # of a pose; the smaller, the surer
 NEVER = 1e6  # score of a pose that is not accepted
 TRIMMED = 0.8  # share of the distances that a trimmed cost counts, the smallest
@@ -59,15 +55,10 @@ Own = Callable[[np.ndarray, np.ndarray, np.ndarray], Any]  # observed, model, in
 
 @dataclass(frozen=True, kw_only=True)
 class Asked:
-    """How many registrations are asked about, and by how many points.
+    """How many registrations are asked about, and by how many points."""
 
-    Attributes:
-        samples: test registrations of each file, at most.
-        points: of each cloud that the rivals register, at most.
-    """
-
-    samples: Count = 1000
-    points: Annotated[int, Bounds(minimum=64, maximum=65536)] = 2048
+    samples: Count = 1000  # test registrations of each file, at most
+    points: Annotated[int, Bounds(minimum=64, maximum=65536)] = 2048  # of each cloud that the rivals register, at most
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,10 +70,7 @@ class RepairSettings(Asked):
 
 @dataclass(frozen=True)
 class Attempts(Container):
-    """What was proposed for N registrations, and what M rivals made of them, in C = P + M columns.
-
-    The first P columns are those of :class:`gpca.model.proposed.Proposed`, which declares the arrays.
-    """
+    """What was proposed for N registrations (P columns, as in `Proposed`), and made of them by M rivals: C = P + M."""
 
     sample_N: np.ndarray = array("N", WHOLE)
     group_N: np.ndarray = array("N", TEXT)  # kind of start on frames; else the same for all
@@ -100,28 +88,19 @@ class Attempts(Container):
     score_N_M_Q: np.ndarray = array(f"N M {len(TESTS)}")
     method_M: np.ndarray = array("M", TEXT)
 
-    def columns(self, first: int, last: int | None) -> Proposed:
+    def columns(self, chosen: slice) -> Proposed:
         """Return some columns as if they were proposals."""
-        chosen = slice(first, last)
-        return Proposed(
-            self.error_N_C[:, chosen],
-            self.weight_N_C[:, chosen],
-            self.distance_N_C_K[:, chosen],
-            self.hypothesis_N_C_K[:, chosen],
-            self.inlier_rmse_N_C[:, chosen],
-            self.fitness_N_C[:, chosen],
-            self.family_N,
-        )
+        names = [name for name in self.array_fields() if "_N_C" in name]
+        arrays: dict[str, Any] = {name.replace("_C", "_P"): getattr(self, name)[:, chosen] for name in names}
+        return Proposed(**arrays, family_N=self.family_N)
 
     @property
     def proposed(self) -> Proposed:
-        """The proposals."""
-        return self.columns(0, -len(self.method_M))
+        return self.columns(slice(-len(self.method_M)))
 
     @property
     def rivals(self) -> Proposed:
-        """What the rivals found, a column each."""
-        return self.columns(-len(self.method_M), None)
+        return self.columns(slice(-len(self.method_M), None))
 
 
 def attempt(job: Job) -> None:
@@ -195,10 +174,7 @@ class World:
 
 
 def searched(pair: ObservedPair, settings: ReenactmentSettings) -> tuple[np.ndarray, np.ndarray]:
-    """Return hypotheses (K, 4, 4) of a pair's true pose and their probabilities (K,), as a re-enactment has them.
-
-    Where there are fewer, the first fills up, with probability 0.
-    """
+    """Return hypotheses (K, 4, 4) of a pair's true pose and probabilities (K,): 0 where the first fills up."""
     T_k, weight_k = search(pair, settings, ModelSurface(pair.model))
     missing = settings.hypotheses - len(T_k)
     return np.concatenate([T_k, *[T_k[:1]] * missing]), np.pad(weight_k, (0, missing))
@@ -229,42 +205,37 @@ def try_all(
         errors.append(world.errors(row, proposals[-1].T_n))
         start_errors.append(world.errors(row, np.eye(4)[None])[0])
         rival = Rivals(pair, surface, icp, settings.points, proposals[-1], perf_counter() - started)
-        tried = [*rival.built_in(), *(rival.by(name, method, warm=row == 0) for name, method in methods.items())]
-        tried += [rival.by_function(name, function) for name, function in functions.items()]
-        T_M = np.array([each.T for each in tried])
+        tried = rival.built_in()
+        tried |= {name: rival.by(name, method, warm=row == 0) for name, method in methods.items()}
+        tried |= {name: rival.by_function(name, function) for name, function in functions.items()}
+        poses, scores, spent = zip(*tried.values(), strict=True)
+        T_M = np.array(poses)
         fitness_M, rmse_M = measured(rival.before, pair.model, icp, moved)(T_M)
         assert proposals[-1].true_poses is not None
         judged_M = proposals[-1].true_poses.errors(T_M)
-        score_M_Q = np.array([each.score_Q for each in tried])
-        columns.append((world.errors(row, T_M), *judged_M, rmse_M, fitness_M, score_M_Q))
-        spent = {REPAIR: rival.repair_seconds} | {each.name: each.seconds for each in tried}
-        seconds += [(int(registrations.sample[row]), *each) for each in spent.items()]
-    proposed = joined(proposals, errors, registrations.cluster)
-    error_N_M, *judged_N_M, rmse_N_M, fitness_N_M, score_N_M_Q = map(np.array, zip(*columns, strict=True))
+        columns.append((world.errors(row, T_M), np.zeros(len(T_M)), *judged_M, rmse_M, fitness_M, np.array(scores)))
+        names_and_seconds = zip((REPAIR, *tried), (rival.repair_seconds, *spent), strict=True)
+        seconds += [(int(registrations.sample[row]), *each) for each in names_and_seconds]
+    *of_rivals, score_N_M_Q = map(np.array, zip(*columns, strict=True))
+    of_proposals = joined(proposals, errors, registrations.cluster).arrays.values()  # the last is no column's
+    names = [name for name in Attempts.array_fields() if "_N_C" in name]
+    columns_N_C: dict[str, Any] = {
+        name: np.hstack(pair) for name, *pair in zip(names, of_proposals, of_rivals, strict=False)
+    }
     attempts = Attempts(
         **world.columns,
         start_error_N=np.array(start_errors),
-        error_N_C=np.hstack([proposed.error_N_P, error_N_M]),
-        weight_N_C=np.hstack([proposed.weight_N_P, np.zeros_like(error_N_M)]),
-        distance_N_C_K=np.hstack([proposed.distance_N_P_K, judged_N_M[0]]),
-        hypothesis_N_C_K=np.hstack([proposed.hypothesis_N_P_K, judged_N_M[1]]),
-        inlier_rmse_N_C=np.hstack([proposed.inlier_rmse_N_P, rmse_N_M]),
-        fitness_N_C=np.hstack([proposed.fitness_N_P, fitness_N_M]),
+        **columns_N_C,
         family_N=registrations.cluster,
         score_N_M_Q=score_N_M_Q,
-        method_M=np.array([*BUILT_IN, *methods, *functions]),
+        method_M=np.array([*tried]),
     )
     return attempts, pd.DataFrame(seconds, columns=["sample", "method", "seconds"])
 
 
-@dataclass(frozen=True)
-class Tried:
-    """What a rival found."""
-
-    name: str
-    T: np.ndarray  # 4×4, takes what was observed, before the registration, to the model
-    score_Q: np.ndarray  # of `TESTS`
-    seconds: float
+# What a rival found: a pose (4×4) that takes what was observed, before the registration, to the model; scores (Q,) of
+# `TESTS`; the seconds that it took.
+Tried = tuple[np.ndarray, np.ndarray, float]
 
 
 @dataclass(frozen=True)
@@ -285,19 +256,17 @@ class Rivals:
 
     @cached_property
     def registrar(self) -> AnyICP:
-        """The registration's ICP, of the observed cloud to the model."""
         return icp_to(self.pair.model, self.icp)
 
-    def built_in(self) -> list[Tried]:
-        """Return `BUILT_IN`."""
+    def built_in(self) -> dict[str, Tried]:
         starts_n = search_starts(self.before, self.pair.model)
         T_runs_n = self.pair.T_runs @ inverse(self.pair.T_init)
         first, weight = self.proposals.T_n[1], float(self.proposals.weight_n[1])
-        return [
-            self._tried(LIKELIEST, perf_counter() - self.repair_seconds, first, 1 - weight),
-            self._tried(STARTS, perf_counter(), self._best(T_runs_n)),
-            self._tried(MANY_STARTS, perf_counter(), self._best(self.registrar.register(self.before, starts_n)[0])),
-        ]
+        return {
+            LIKELIEST: self._tried(perf_counter() - self.repair_seconds, first, 1 - weight),
+            STARTS: self._tried(perf_counter(), self._best(T_runs_n)),
+            MANY_STARTS: self._tried(perf_counter(), self._best(self.registrar.register(self.before, starts_n)[0])),
+        }
 
     def by(self, name: str, method: Callable[[Pair], Outcome], warm: bool) -> Tried:
         """Return the pose of a registration method, refined where that lowers the trimmed cost; all start alike."""
@@ -309,7 +278,7 @@ class Rivals:
         outcome = method(pair.with_normals())
         refined = self.registrar.register(self.before, outcome.T_target_source[None])[0]
         T = self._best(np.concatenate([outcome.T_target_source[None], refined]))
-        return self._tried(name, started, T, failed=not outcome.converged)
+        return self._tried(started, T, failed=not outcome.converged)
 
     def by_function(self, name: str, function: Own) -> Tried:
         """Return the pose of a function of observed cloud, model and initial pose, whose doubt is its negative
@@ -322,16 +291,16 @@ class Rivals:
             )
         T, confidence = answer if isinstance(answer, tuple) else (answer, 0.0)
         if T is None:
-            return self._tried(name, started, inverse(self.pair.T_init), failed=True)
+            return self._tried(started, inverse(self.pair.T_init), failed=True)
         T = require_numbers(T, (4, 4), f"pose by {name}").astype(float)
         require_rigid(T, f"pose by {name}")
-        return self._tried(name, started, T, finite_number(name, "confidence", str(confidence), "return a number") * -1)
+        return self._tried(started, T, finite_number(name, "confidence", str(confidence), "return a number") * -1)
 
-    def _tried(self, name: str, started: float, T: np.ndarray, doubt: float = 1.0, failed: bool = False) -> Tried:
+    def _tried(self, started: float, T: np.ndarray, doubt: float = 1.0, failed: bool = False) -> Tried:
         _, fitness_n, rmse_n = self.registrar.register(self.before, T[None], max_iterations=0)
         scores = (1 - fitness_n[0], rmse_n[0], self._trimmed_cost(T), self._spread(T), doubt)
         score_Q = np.full(len(TESTS), NEVER) if failed or not fitness_n[0] else np.array(scores)
-        return Tried(name, T, score_Q, perf_counter() - started)
+        return T, score_Q, perf_counter() - started
 
     def _best(self, T_n: np.ndarray) -> np.ndarray:
         return T_n[int(np.argmin([self._trimmed_cost(T) for T in T_n]))]

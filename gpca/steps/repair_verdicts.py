@@ -36,12 +36,7 @@ class Limits:
 
 
 def verdicts(attempts: Mapping[str, Sequence[tuple[str, int, Attempts]]], tolerance: float) -> Frame:
-    """Return a row for each track, source, seed, sample and method.
-
-    Args:
-        attempts: track -> source, seed and attempts of each of its files.
-        tolerance: largest error of a right pose, in diameters.
-    """
+    """Return a row for each registration and method, given source, seed and attempts by track."""
     import pandas as pd
 
     learned = Attempts.joined([each for _, _, each in attempts[CAUSES]])
@@ -113,8 +108,7 @@ def decided(each: Attempts, row: int, limits: Limits, tolerance: float) -> Itera
             yield method, (failed, called, replaced, replaced and right, right, False, shown)
 
 
-def log_odds(probability: float) -> float:
-    """Return what keeps the order of small probabilities in a file of few decimals."""
+def log_odds(probability: float) -> float:  # keeps the order of small probabilities in a file of few decimals
     return float(logit(np.clip(probability, 1e-12, 1 - 1e-12)))
 
 

@@ -1,12 +1,10 @@
 """Step ``time_stages``: model, registrations and embeddings -> ``runtime.csv``, the seconds of every stage."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from copy import copy, deepcopy
 from dataclasses import replace
 from functools import partial
 from itertools import chain
-from time import perf_counter
-from typing import TypeVar
 
 import numpy as np
 
@@ -31,17 +29,16 @@ from gpca.process.processor import cpu_name
 from gpca.process.progress import progress
 from gpca.rigid import transform
 from gpca.seeds import generator
+from gpca.steps.registration_trials import timed
 
 WARM_UP = 2  # rounds that do not count: the first calls load compiled functions
 SMALL = 512  # points of the smaller explanation
 STRATEGY = "bald_kmeans"  # of active learning, the paper's
-Result = TypeVar("Result")
 CloudPair = tuple[np.ndarray, np.ndarray]  # source and target (N, 3), in diameters
 Times = Iterator[tuple[tuple[str, str], float]]  # (component, device) and its seconds
 
 
 def run(job: Job) -> None:
-    """Measure every component, repeat by repeat."""
     axes = (job.source, job.seed)
     inputs = [job.model, job.registrations, job.embeddings]
     with record_provenance([job.out], inputs, job.settings, seed=job.seed):
@@ -63,10 +60,7 @@ def measure(
     threads: int,
     *axes: object,
 ) -> Frame:
-    """Return a row per component and device: mean, standard deviation and median over the repeats, in seconds.
-
-    A repeat goes once through all components, so that whatever else the machine does meets all of them.
-    """
+    """Return a row per component and device: mean, standard deviation and median over the repeats, in seconds."""
     import pandas as pd
     import torch
 
@@ -80,6 +74,7 @@ def measure(
     # An explanation refuses clouds of fewer points, which a heavy occlusion can leave.
     rows = [row for row in registrations.rows("test") if len(registrations.cloud(row)) >= FEWEST_CLOUD_POINTS]
     seconds: dict[tuple[str, str], list[float]] = {}
+    # A repeat goes through all components, so that whatever else the machine does meets all of them.
     for repeat in progress(range(WARM_UP + repeats), "runtime"):
         random = generator(*axes, "runtime", repeat)
         row = int(rows[repeat % len(rows)])
@@ -102,13 +97,6 @@ def measure(
     )
 
 
-def timed(work: Callable[[], Result]) -> tuple[Result, float]:
-    """Result of a function, and the seconds that it took."""
-    started = perf_counter()
-    result = work()
-    return result, perf_counter() - started
-
-
 def time_stages(
     explainers: Mapping[str, Explainer], model: Model, pair: CloudPair, random: np.random.Generator
 ) -> Times:
@@ -120,7 +108,7 @@ def time_stages(
     yield ("icp_open3d", "CPU"), timed(lambda: ICP(target, None, model.icp).register(source, start))[1]
     aligned = transform(poses[0], source)
     for device, explainer in explainers.items():
-        h_1_d, elapsed = timed(partial(explainer.embed, aligned))
+        h_1_d, elapsed = timed(explainer.embed, aligned)
         yield ("features", device), elapsed
 
     def draws_M_1_C() -> np.ndarray:
@@ -129,7 +117,7 @@ def time_stages(
 
     logits, elapsed = timed(draws_M_1_C)
     yield ("sampling", "CPU"), elapsed
-    yield ("scores", "CPU"), timed(lambda: summarize_draws(logits))[1]
+    yield ("scores", "CPU"), timed(summarize_draws, logits)[1]
 
 
 def time_explanations(explainers: Mapping[str, Explainer], pairs: Mapping[str, CloudPair]) -> Times:

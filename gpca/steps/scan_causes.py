@@ -1,8 +1,4 @@
-"""The steps of causes on scans: measured causes of registrations, and what explainers answer.
-
-An explainer has learned from objects, or from scans of all scenes outside the fold that it is asked about; encoders of
-the aligned source are those of objects in both cases.
-"""
+"""The steps of causes on scans: measured causes, and answers by what learned from objects or scans of other folds."""
 
 import sys
 from collections.abc import Callable, Mapping, Sequence

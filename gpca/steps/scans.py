@@ -43,10 +43,7 @@ def draw_scans(job: Job) -> None:
 
 
 def drawn_pairs(job: Job, choice: Mapping[str, Any]) -> list[ScanPair]:
-    """Pairs of the data set that a job names by its entry, place and role.
-
-    The choice has the edges of the strata, and pairs of each scene and stratum and points of a scan, at most.
-    """
+    """Pairs of a job's data set; `choice` has strata of overlap, most pairs of each, and points of a scan."""
     entry, place = entry_of(job.section("entry")), Path(job.place) if job.get("place") else None
     scenes = scenes_of(entry, place, job.settings["role"], choice["scan_points"])
     pairs = choose_pairs(scenes, choice["strata"], choice["pairs"], job.source, job.seed)
@@ -57,7 +54,6 @@ def drawn_pairs(job: Job, choice: Mapping[str, Any]) -> list[ScanPair]:
 
 
 def register(job: Job) -> None:
-    """Register the pairs of one data set and seed."""
     settings = read_settings(TrialSettings, fields_of(job.section("scans"), TrialSettings))
     methods = job.by_name("methods", job.methods)
     with record_provenance([*job.rows, *job.timings], [job.scans], job.settings, seed=job.seed):

@@ -96,9 +96,7 @@ def predict_sets(make: Callable[[], ConceptExplainer], sets: ShiftedSets) -> Fra
         learner = make()
         learner.fit(sets.registrations(sets.rows(home, "train")))
         test = sets.registrations(rows)
-        frame = prediction_frame(test, learner.explain(test.without_labels()))
-        frame.insert(0, "set", sets.set[rows])
-        frames.append(frame)
+        frames.append(prediction_frame(test, learner.explain(test.without_labels()), set=sets.set[rows]))
     return pd.concat(frames, ignore_index=True)
 
 
@@ -176,11 +174,7 @@ def _measured(parts: dict[str, Registrations], source: str, seed: int, settings:
 
 
 def distances(train_N_F: np.ndarray, query_S_F: np.ndarray, neighbours: int) -> np.ndarray:
-    """Return distances (S, 2) in features that are standardized on the training samples.
-
-    The first is the mean Euclidean distance to the nearest of them, or to all, the second that to their mean by their
-    covariance (Ledoit & Wolf 2004).
-    """
+    """Return the standardized distance (S, 2) to the nearest training samples on average, and by their covariance."""
     from scipy.linalg import pinvh
     from sklearn.covariance import ledoit_wolf
     from sklearn.neighbors import NearestNeighbors

@@ -1,8 +1,6 @@
 """The steps of shifted truths: samples of one shift, what explainers read of them, and what they answer (Table IX)."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +10,7 @@ from gpca.causes.dataset import Causes, labeled
 from gpca.causes.descriptors import describe_all
 from gpca.causes.drawing import draw_shifted
 from gpca.causes.settings import CauseSettings, DescriptorSettings
-from gpca.explainers.interface import REENACTED
+from gpca.explainers.interface import BARE, REENACTED
 from gpca.io.csv_file import write_csv
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
@@ -22,7 +20,7 @@ from gpca.reenactment.dataset import reenact_all
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.seeds import seed_of_file
 from gpca.settings import read_settings
-from gpca.steps.diagnosis import DESCRIBED, World, learned_files, with_what_it_reads
+from gpca.steps.diagnosis import World, learned_files, with_what_it_reads
 
 STANDARD = "standard"  # the truth that explainers learn
 LABELS = ("shift", "source", "explainer")  # columns before those of predictions
@@ -70,49 +68,33 @@ def observe(job: Job) -> None:
             reenact_all(causes, *axes, reenactment, given)[0].save(enacted)
 
 
-@dataclass(frozen=True)
-class Asked:
-    """Test samples of one shift and source, and the files of what explainers read of them."""
-
-    shift: str
-    source: str
-    causes: Causes
-    files: dict[str, Path]
-
-    def registrations(self, reads: str = "") -> Registrations:
-        """Return them with labels, and with what explainers read."""
-        every = labeled(self.causes)
-        every = with_what_it_reads(every, reads, self.files[reads]) if reads else every
-        return every.subset(self.causes.rows("test"))
-
-
-def asked_about(job: Job) -> Iterator[Asked]:
-    """Yield the test samples of the truth that was learned and of each shift; a shift's files are named by it."""
-    files = list(zip(job.causes, job.descriptors, job.reenactments, strict=True))
-    shifted = list(zip(job.shifted_causes, job.shifted_descriptors, job.shifted_reenactments, strict=True))
-    for path, described, enacted in files + shifted:
-        shift = STANDARD if path in job.causes else path.parts[-4]
-        yield Asked(shift, path.parent.name, Causes.load(path), {DESCRIBED: described, REENACTED: enacted})
-
-
 def diagnose(job: Job) -> None:
     """Train every explainer on the training samples of all sources, and ask it about each shift -> its predictions."""
     learned = learned_files(job)
     inputs = [path for paths in learned.values() for path in paths]
     inputs += [*job.shifted_causes, *job.shifted_descriptors, *job.shifted_reenactments]
     with record_provenance([job.predictions], inputs, job.settings, seed=job.seed):
-        asked = [each for each in asked_about(job) if each.source in job.sources_asked]
+        # Samples of the truth that was learned and of each shift, whose files are named by it; what is read of them.
+        files = list(zip(job.causes, job.descriptors, job.reenactments, strict=True))
+        files += zip(job.shifted_causes, job.shifted_descriptors, job.shifted_reenactments, strict=True)
+        files = [each for each in files if each[0].parent.name in job.sources_asked]
+        samples = [Causes.load(path) for path, _, _ in files]
 
-        def read(reads: str) -> Registrations:
-            return Registrations.joined([each.registrations(reads) for each in asked])
+        def read(reads: str = "") -> Registrations:
+            parts = []
+            for causes, (_, described, enacted) in zip(samples, files, strict=True):
+                every = with_what_it_reads(labeled(causes), reads or BARE, enacted if reads == REENACTED else described)
+                parts.append(every.subset(causes.rows("test")))
+            return Registrations.joined(parts)
 
-        tested = [each.causes.registrations.subset(each.causes.rows("test")) for each in asked]
-        every, starts = read(""), asked[0].causes.T_target_source_runs.shape[1]
+        shifts = [STANDARD if path in job.causes else path.parts[-4] for path, _, _ in files]
+        tested = [causes.registrations.subset(causes.rows("test")) for causes in samples]
+        every, starts = read(), samples[0].T_target_source_runs.shape[1]
         world = World(job, learned, every, starts, read, apart=True)
         counts = [len(part) for part in tested]
         columns = {
-            "shift": np.repeat([each.shift for each in asked], counts),
-            "source": np.repeat([each.source for each in asked], counts),
+            "shift": np.repeat(shifts, counts),
+            "source": np.repeat([path.parent.name for path, _, _ in files], counts),
             "sample": np.concatenate([part.sample for part in tested]),
             "concept_true": np.concatenate([part.concept for part in tested]),  # of borderline samples as well
         }

@@ -2,8 +2,18 @@ from collections import Counter
 
 import numpy as np
 import pytest
+import sklearn.cluster
 
-from gpca.active_learning.acquisition import EXPANSION, STRATEGIES, Pool, balanced_kmeans, bald_kmeans, select, top
+from gpca.active_learning.acquisition import (
+    EXPANSION,
+    STRATEGIES,
+    Pool,
+    balanced_kmeans,
+    bald_kmeans,
+    kmeans_plusplus,
+    select,
+    top,
+)
 from gpca.errors import InputError
 
 every_strategy = pytest.mark.parametrize("name", STRATEGIES)
@@ -92,6 +102,15 @@ def test_bald_kmeans_takes_the_middle_of_each_cluster_of_uncertain_samples(batch
         members = np.flatnonzero(np.linalg.norm(h - center, axis=1) < 1)
         expected.add(int(members[np.linalg.norm(h[members] - h[members].mean(axis=0), axis=1).argmin()]))
     assert set(selected("bald_kmeans", pool, batch, seed)) == expected
+
+
+@pytest.mark.parametrize(("n", "d"), [(2, 2), (40, 3), (300, 17), (60, 1024)])
+def test_first_centers_are_those_of_scikit_learn(n, d):
+    random = np.random.default_rng(n)
+    for h_n_d in (random.normal(size=(n, d)), np.round(random.normal(size=(n, d)))):
+        for clusters in (1, min(20, len(np.unique(h_n_d, axis=0)))):
+            _, rows = sklearn.cluster.kmeans_plusplus(h_n_d, clusters, random_state=7)
+            assert kmeans_plusplus(h_n_d, clusters, 7) == rows.tolist()
 
 
 @pytest.mark.parametrize("n, clusters", [(16, 4), (10, 4), (5, 1), (3, 3)])

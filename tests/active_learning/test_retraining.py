@@ -48,18 +48,18 @@ def test_a_round_fits_the_classifier_to_all_labels_and_to_nothing_else(task, col
     concept_L = np.concatenate([task.initial.concept_N, task.pool.concept_N[rows]])
     plain = GPC(CONCEPTS, QUICK, "tiny", 0, "retraining", "overlap").fit(h_L_d, concept_L)
     fitted, seen = (one.fit(rows, None) for one in (cold, Retraining(task, QUICK, "tiny", 0, sees_pool=True)))
-    assert np.array_equal(fitted.scores(task.test.h), plain.scores(task.test.h))
-    assert np.abs(seen.scores(task.test.h) - plain.scores(task.test.h)).max() > 1e-3
+    assert np.array_equal(fitted.attribute(task.test.h)[0], plain.attribute(task.test.h)[0])
+    assert np.abs(seen.attribute(task.test.h)[0] - plain.attribute(task.test.h)[0]).max() > 1e-3
 
 
 def test_a_warm_start_goes_on_from_the_classifier_before_and_leaves_it_as_it_was(task, cold):
     before = cold.fit([], None)
-    scores = before.scores(task.test.h)
+    scores = before.attribute(task.test.h)[0]
     still = Retraining(task, replace(QUICK, learning_rate=1e-7, iterations=1), "tiny", 0, warm=True)
-    assert still.fit([0, 1], before).scores(task.test.h) == pytest.approx(scores, abs=1e-4)
+    assert still.fit([0, 1], before).attribute(task.test.h)[0] == pytest.approx(scores, abs=1e-4)
     moved = Retraining(task, QUICK, "tiny", 0, warm=True).fit([0, 1], before)
-    assert np.abs(moved.scores(task.test.h) - scores).max() > 1e-2
-    assert np.array_equal(before.scores(task.test.h), scores)
+    assert np.abs(moved.attribute(task.test.h)[0] - scores).max() > 1e-2
+    assert np.array_equal(before.attribute(task.test.h)[0], scores)
 
 
 def test_rounds_are_small_up_to_the_least_labels_and_end_with_the_budget(cold, of_rounds):

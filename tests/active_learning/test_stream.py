@@ -158,5 +158,5 @@ def test_what_was_believed_before_is_the_prior_of_what_comes_after():
 @pytest.mark.parametrize("deviation", [0.1, 100.0])
 def test_no_prior_makes_it_diverge(monkeypatch, deviation):
     monkeypatch.setattr(stream, "DEVIATION", deviation)
-    scores_N_C = layer(np.arange(40)).scores(inputs(X_N_D))
+    scores_N_C = layer(np.arange(40)).attribute(inputs(X_N_D))[0]
     assert np.isfinite(scores_N_C).all()

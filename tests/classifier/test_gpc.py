@@ -53,9 +53,8 @@ def test_far_from_the_data_the_posterior_is_the_prior_and_bald_is_large(gpc):
 
 
 @pytest.mark.parametrize("rows", [[0], [0, 1, 2], [2, 1, 0], list(range(89, -1, -1))])
-def test_a_result_does_not_depend_on_the_other_samples_and_scores_alone_are_the_same(gpc, rows):
+def test_a_result_does_not_depend_on_the_other_samples(gpc, rows):
     together = gpc.attribute(H_TEST)
-    assert gpc.scores(H_TEST).tobytes() == together[0].tobytes()
     for whole, part in zip(together, gpc.attribute(H_TEST[rows]), strict=True):
         assert np.abs(whole[rows] - part).max() < 1e-6
 

@@ -54,7 +54,7 @@ def test_another_seed_gives_other_numbers_by_far():
 
 def test_the_classes_are_gpytorchs_own():
     _, theirs = pair(iterations=1)
-    strategy, of_one = theirs._model.variational_strategy, theirs._model.strategy
+    strategy, of_one = theirs._model.variational_strategy, theirs._model.variational_strategy.base_variational_strategy
     assert isinstance(theirs._model, gpytorch.models.ApproximateGP)
     assert type(strategy) is gpytorch.variational.IndependentMultitaskVariationalStrategy
     assert type(of_one) is gpytorch.variational.VariationalStrategy

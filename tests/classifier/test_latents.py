@@ -38,8 +38,9 @@ def trained():
         gpc = GPC(CLASSES, QUICK, "blobs", 0).fit(H, LABELS)
     (model,) = models
     reference = LatentGPs(gpytorch_kernel(model.covariance.learned()), model.inducing_M_d.detach())
-    reference.strategy.variational_params_initialized.fill_(1)  # or gpytorch would set them to the prior's
-    distribution = reference.strategy._variational_distribution
+    strategy = reference.variational_strategy.base_variational_strategy
+    strategy.variational_params_initialized.fill_(1)  # or gpytorch would set them to the prior's
+    distribution = strategy._variational_distribution
     with torch.no_grad():
         distribution.variational_mean.copy_(model.mean_C_M)
         distribution.chol_variational_covar.copy_(model.root_C_M_M)

@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from gpca.classifier.gpytorch_classes import LatentGPs, ascend, gpytorch_kernel
-from gpca.classifier.prior import COVARIANCES, Covariance
+from gpca.classifier.prior import COVARIANCES, Covariance, Prior
 from gpca.classifier.sparse_gp import LearnedCovariance, SparseGPs, _cholesky
 from gpca.errors import InputError
 
@@ -82,7 +82,7 @@ INPUTS = CENTERS[TARGETS] + 0.7 * torch.randn(90, 16, generator=torch.Generator(
 
 
 def fitted(name, iterations, learning_rate=0.05, inputs=INPUTS, targets=TARGETS):
-    model = SparseGPs(Covariance.start(name, 3, 4.0), inputs[:9], torch.Generator().manual_seed(5))
+    model = SparseGPs(Prior(Covariance.start(name, 3, 4.0), inputs[:9].numpy()), torch.Generator().manual_seed(5))
     optimizer = torch.optim.Adam(model.parameters(), lr=learning_rate)
     losses = []
     for _ in range(iterations):

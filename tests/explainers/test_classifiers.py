@@ -40,9 +40,9 @@ def test_they_say_what_scikit_learn_says_also_after_the_way_to_a_file(samples):
     question = BoostedQuestion.fit(inputs_N_F, yes_N, "tiny", 0)
     expected = boosted_trees("tiny", 0).fit(inputs_N_F, yes_N).predict_proba(asked)[:, 1]
     np.testing.assert_allclose(question.probability(asked), expected, atol=1e-12)
-    state = question.state()
+    state = vars(question)
     require_trees(state, 6)
-    loaded = BoostedQuestion.from_state(state)
+    loaded = BoostedQuestion(**state)
     assert loaded.probability(asked).tobytes() == question.probability(asked).tobytes()
     assert loaded.probability(asked[:1])[0] == question.probability(asked)[0]
 
@@ -52,6 +52,6 @@ def test_a_single_answer_needs_no_tree_and_few_samples_are_not_split(samples):
     answers = {name: np.full(len(yes_N), name) for name in (False, True)}
     for answer, answer_N, n in ((False, answers[False], 200), (True, answers[True], 200), (None, yes_N, 10)):
         question = BoostedQuestion.fit(inputs_N_F[:n], answer_N[:n], "tiny", 0)
-        require_trees(question.state(), 6)
+        require_trees(vars(question), 6)
         assert np.ptp(question.probability(inputs_N_F)) == 0
         assert answer in (None, question.probability(inputs_N_F)[0] > 0.5)

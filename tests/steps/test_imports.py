@@ -21,7 +21,7 @@ NEEDED = {  # step, and what is changed of its words -> the libraries among thos
     "reenact": ({}, set()),
     "uncertainty": ({}, set()),
     "embed": ({}, {"torch"}),
-    "attribute": ({}, {"torch"}),
+    "attribute": ({}, {"pandas", "sklearn", "torch"}),
     "attribute by a rule": ({"--explainer": "rule", "--settings": {}}, set()),
 }
 

@@ -49,7 +49,7 @@ def test_what_explain_queues_is_labeled_and_learned(queued, capsys):
     before, after = Model.load("model.pt"), Model.load("learned.pt")
     assert len(after.gpc.learned_N_d) == len(before.gpc.learned_N_d) + 2
     with np.load("queued.npz") as queue:
-        scores = [model.gpc.scores(queue["h"])[:, 2].sum() for model in (before, after)]
+        scores = [model.gpc.attribute(queue["h"])[0][:, 2].sum() for model in (before, after)]
     assert scores[1] > scores[0]
 
 

@@ -75,8 +75,7 @@ def test_every_explainer_answers_for_the_test_samples_of_every_shift(folder):
 
 
 def test_nothing_is_learned_from_families_that_are_asked_about(folder, causes):
-    asked = [step.Asked("", "four", causes, {})]
-    every = asked[0].registrations()
+    every = step.labeled(causes).subset(causes.rows("test"))
     learned = {"causes": [folder / "standard/causes/four/seed100.npz"]}
     learned |= {"descriptors": [folder / "standard/descriptors/four/seed100.npz"]}
     job = Job(source="x", seed=100, settings={"encoder": {}, "descriptors": {}, "reenactment": {}})

@@ -113,7 +113,6 @@ def like_the_training(sets: ShiftedSets) -> Registrations:
 
 
 def train_and_test(registrations: Registrations) -> list[Registrations]:
-    """The samples of either split."""
     return [registrations.subset(registrations.rows(split)) for split in ("train", "test")]
 
 
@@ -123,7 +122,6 @@ def accuracies(true_S: np.ndarray, scores_S_C: np.ndarray) -> Values:
 
 
 def accuracies_of_named(true_S: np.ndarray, named_S: np.ndarray) -> Values:
-    """Accuracies of the concepts that were named."""
     by_concept = concept_accuracy(true_S, named_S, np.zeros(len(true_S), bool), CONCEPTS)
     return {("accuracy", concept): value for concept, value in by_concept.items()}
 

@@ -25,7 +25,6 @@ STEPS = {"small": STEP * KNOB_RANGE, "middle": np.subtract(MIDDLE, UNTOUCHED)}
 
 
 def sensitivity(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
-    """Accuracies of local sensitivity analysis under each reading."""
     settings = run_files.uncertainty()
     for source, seed, pairs in _pairs(run_files, settings.starts, "sensitivity"):
         steps = [(concept, _steps(runs["observed"], settings)) for concept, runs in pairs]
@@ -41,7 +40,6 @@ def sensitivity(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Ro
 
 
 def shap(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
-    """Accuracies of SHAP under each reading."""
     starts = sorted({reading["starts"] for reading in readings})
     for source, seed, pairs in _pairs(run_files, starts[-1], "shap"):
         cornered = [(each, {name: _corners(pair, starts) for name, pair in runs.items()}) for each, runs in pairs]
@@ -72,15 +70,15 @@ def accuracies_of_magnitudes(pairs: Iterable[Pair], turned_R_3: np.ndarray, floo
         turned = (Knobs(*np.where(on, turned_3, UNTOUCHED)) for turned_3 in turned_R_3 for on in CORNERS)
         spread = np.array([knob_runs.runs(corner)[0].covariance(T_ref) for corner in turned])
         worths.append(_worth(spread.reshape(len(turned_R_3), len(CORNERS), 6, 6), "divergence", floor))
-    true_S = np.array(concept_S)
-    values: dict[str, list[float]] = {"shap_additive": [], "sa_local_additive": []}
-    for number, turned_3 in enumerate(turned_R_3):
-        worth_S_8 = np.array([worth_R_8[number] for worth_R_8 in worths])
-        change_S_3 = worth_S_8[:, [1 << knob for knob in range(3)]] - worth_S_8[:, :1]
-        derivative_S_3 = change_S_3 / ((turned_3 - UNTOUCHED) / KNOB_RANGE)
-        values["shap_additive"].append(_accuracy(true_S, shapley_values(worth_S_8), "signed"))
-        values["sa_local_additive"].append(_accuracy(true_S, derivative_S_3, "signed"))
-    return {method: np.array(value_R) for method, value_R in values.items()}
+    worth_R_S_8, step_R_1_3 = np.array(worths).swapaxes(0, 1), ((turned_R_3 - UNTOUCHED) / KNOB_RANGE)[:, None]
+    values_R_S_3 = {
+        "shap_additive": np.array([shapley_values(worth_S_8) for worth_S_8 in worth_R_S_8]),
+        "sa_local_additive": (worth_R_S_8[:, :, [1, 2, 4]] - worth_R_S_8[:, :, :1]) / step_R_1_3,
+    }
+    return {
+        method: np.array([_accuracy(np.array(concept_S), values_S_3, "signed") for values_S_3 in of_method])
+        for method, of_method in values_R_S_3.items()
+    }
 
 
 def _pairs(run_files: RunFiles, starts: int, title: str) -> Iterator[tuple[str, int, Iterator[Pair]]]:

@@ -10,7 +10,6 @@ from gpca.active_learning.rounds import LabelingTask, initial_gpc, make_task, ro
 from gpca.active_learning.settings import JUDGED_SHARE, ActiveLearningSettings, RareSettings, rare_setting
 from gpca.classifier.gpc import GPC
 from gpca.errors import InputError
-from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
 from gpca.settings import read_settings
@@ -26,7 +25,7 @@ STRATEGIES = ("bald_kmeans", "random")
 
 def pool(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
     """Labels and epochs to the target under each reading, by BALD with k-means and by random choice."""
-    base, target = base_settings(run_files)
+    base, _, target = label_settings(run_files)
     for source, seed, registrations, _ in run_files.in_distribution():
         started: dict[tuple, tuple[LabelingTask, GPC] | None] = {}
         labeled: dict[tuple, Values] = {}
@@ -46,7 +45,7 @@ def pool(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
             for strategy, (batch, labels) in budgets.items():
                 if (key := (*start, strategy, batch)) not in labeled:
                     budget = replace(settings, batch=batch, labels=labels)
-                    steps = until(target, *begun, strategy, budget, source, seed)
+                    steps, _ = until(target, *begun, strategy, budget, source, seed)
                     labeled[key] = {
                         ("labels_to_target", NEW): float(steps[-1]["labels"]),
                         ("epochs_at_target", NEW): float(sum(step["epochs"] for step in steps)),
@@ -55,28 +54,28 @@ def pool(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
                 yield reading, source, strategy, seed, labeled[key]
 
 
+Steps = tuple[list[dict[str, float]], list[list[int]]]  # and the rows of the pool that are labeled then
+
+
 def until(
-    accuracy: float,
-    task: LabelingTask[np.ndarray],
-    gpc: GPC,
-    strategy: str,
-    settings: ActiveLearningSettings,
-    *axes: object,
-) -> list[dict[str, float]]:
+    accuracy: float, task: LabelingTask, gpc: GPC, strategy: str, settings: ActiveLearningSettings, *axes: object
+) -> Steps:
     """Rounds to the first of that accuracy, or all of them."""
-    done = []
-    for step, _ in rounds(task.project(gpc), gpc, strategy, settings, *axes, "reading"):
-        done.append(step)
+    steps, labeled = [], []
+    for step, rows in rounds(task.project(gpc), gpc, strategy, settings, *axes, "reading"):
+        steps.append(step)
+        labeled.append(rows)
         if step["accuracy"] >= accuracy:
             break
-    return done
+    return steps, labeled
 
 
 def epochs(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
     """Passes of Adam that a new classifier takes to the target, and whether it gets there, on the protocol's labels."""
-    rare, target = rare_settings(run_files)
+    base, rare, target = label_settings(run_files)
     for source, seed, registrations, _ in run_files.in_distribution():
-        task, axes = judged_task(run_files, registrations, source, seed)
+        axes = source, seed, JUDGED
+        task = make_task(registrations, NEW, base, source, seed, new_share=JUDGED_SHARE)
         learned = learn(Retraining(task, rare.gpc, *axes), "bald_kmeans", rare, [target], *axes)
         queried = {"at_target": learned.labels_to(target), "all": learned.queried}
         for reading in progress(readings, f"epochs on {source}, seed {seed}"):
@@ -90,10 +89,7 @@ def epochs(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
 def passes_to(
     accuracy: float, gpc: GPC, task: LabelingTask[np.ndarray], rows: Sequence[int], looks: Iterable[int]
 ) -> tuple[float, float]:
-    """Passes of a new classifier over the initial samples and these rows of the pool to an accuracy, and 1.0.
-
-    Where no look at it finds that accuracy, all passes and 0.0.
-    """
+    """Passes of a new classifier over initial and these samples to an accuracy, and 1.0; else all passes and 0.0."""
     h_L_d = np.concatenate([task.initial.h, task.pool.h[rows]])
     passes, concept_L = 0, np.concatenate([task.initial.concept_N, task.pool.concept_N[rows]])
     for passes in gpc.fit_up_to(looks, h_L_d, concept_L):
@@ -105,9 +101,10 @@ def passes_to(
 
 def classifiers(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
     """Labels and epochs to the target by the classifier, also by that of the protocol."""
-    rare, target = rare_settings(run_files)
+    base, rare, target = label_settings(run_files)
     for source, seed, registrations, _ in run_files.in_distribution():
-        task, axes = judged_task(run_files, registrations, source, seed)
+        axes = source, seed, JUDGED
+        task = make_task(registrations, NEW, base, source, seed, new_share=JUDGED_SHARE)
         for reading in progress(readings, f"classifiers of {source}, seed {seed}"):
             settings = replace(rare.gpc, learning_rate=reading["learning_rate"], iterations=reading["iterations"])
             start, sees_pool = reading["start"], reading["inputs"] == "pool"
@@ -117,8 +114,8 @@ def classifiers(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Ro
                     gpc = GPC(CONCEPTS, settings, *axes, "posterior")
                     gpc.fit(task.initial.h, task.initial.concept_N, around).level()
                     batch = RANDOM_BATCH if strategy == "random" else rare.batch
-                    budget = replace(base_settings(run_files)[0], batch=batch, labels=rare.labels)
-                    steps = until(target, task, gpc, strategy, budget, *axes)
+                    budget = replace(base, batch=batch, labels=rare.labels)
+                    steps, _ = until(target, task, gpc, strategy, budget, *axes)
                 else:
                     retraining = Retraining(task, settings, *axes, warm=start == "warm", sees_pool=sees_pool)
                     steps = learn(retraining, strategy, rare, [target], *axes).steps
@@ -130,22 +127,8 @@ def classifiers(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Ro
                 yield reading, source, strategy, seed, of_new
 
 
-def judged_task(
-    run_files: RunFiles, registrations: Registrations, source: str, seed: int
-) -> tuple[LabelingTask[np.ndarray], tuple]:
-    """Task of the row that is judged, in which the new concept is rare, and the axes of its draws."""
-    base, _ = base_settings(run_files)
-    task = make_task(registrations, NEW, base, source, seed, new_share=JUDGED_SHARE)
-    return task, (source, seed, JUDGED)
-
-
-def rare_settings(run_files: RunFiles) -> tuple[RareSettings, float]:
-    """Settings by which that task is learned, and its target accuracy."""
+def label_settings(run_files: RunFiles) -> tuple[ActiveLearningSettings, RareSettings, float]:
+    """Settings of the protocol, those of the row that is judged, in which the concept is rare; the target accuracy."""
     section = run_files.section("active_learning")
-    return read_settings(RareSettings, section.get("rare") or {}), section["target"]
-
-
-def base_settings(run_files: RunFiles) -> tuple[ActiveLearningSettings, float]:
-    """Settings of the protocol, and its target accuracy."""
-    section = run_files.section("active_learning")
-    return ActiveLearningSettings.from_dict(section), section["target"]
+    rare = read_settings(RareSettings, section.get("rare") or {})
+    return ActiveLearningSettings.from_dict(section), rare, section["target"]

@@ -11,9 +11,9 @@ from scipy.special import softmax
 from gpca.attribution.diagnostics import aurc, calibration_error, rank_correlation
 from gpca.attribution.learner_predictions import probabilities, read_learner_predictions, sets_of, wrong
 from gpca.classifier.gpc import GPC
-from gpca.classifier.prior import Covariance, Standardization
+from gpca.classifier.prior import Covariance, Prior, Standardization
 from gpca.classifier.settings import GPCSettings
-from gpca.classifier.sparse_gp import SparseGPs, Start
+from gpca.classifier.sparse_gp import SparseGPs
 from gpca.encoders.registry import EncoderSettings
 from gpca.encoders.training import embed, train_encoder
 from gpca.evaluation.measures import ALL
@@ -48,7 +48,6 @@ class UnitNorm(Standardization):
     """Inputs of length 1, each scaled by itself."""
 
     def __call__(self, h_N_d: np.ndarray) -> np.ndarray:
-        """Scaled inputs; one of length 0 stays as it is."""
         return to_unit_norm(h_N_d)
 
 
@@ -60,22 +59,21 @@ class StartedGPC(GPC):
         self._reading = reading
 
     def scaling(self, around_R_d: np.ndarray) -> Standardization:
-        """Scale of the inputs."""
         if self._reading["inputs"] == "standardised":
             return super().scaling(around_R_d)
         unscaled = np.zeros(around_R_d.shape[1]), np.ones(around_R_d.shape[1])
         return (UnitNorm if self._reading["inputs"] == "unit_norm" else Standardization)(*unscaled)
 
-    def start(self, inputs_R_d: torch.Tensor) -> Start:
+    def start(self, inputs_R_d: torch.Tensor) -> Prior:
         """Inducing inputs at k-means centers or drawn, and the lengthscale."""
         start = super().start(inputs_R_d)
         covariance, inducing_M_d = start.covariance, start.inducing_M_d
         if self._reading["inducing"] == "random":
             random = torch.Generator().manual_seed(seed_of(*self._axes, "random inducing inputs"))
-            inducing_M_d = torch.randn((self.settings.inducing, inputs_R_d.shape[1]), generator=random)
+            inducing_M_d = torch.randn((self.settings.inducing, inputs_R_d.shape[1]), generator=random).numpy()
         if self._reading["lengthscale"] == "default":
             covariance = Covariance.start(self.settings.kernel, len(self.classes))
-        return Start(covariance, inducing_M_d, start.seed)
+        return Prior(covariance, inducing_M_d)
 
     def objective(
         self, model: SparseGPs, inputs_N_d: torch.Tensor, targets_N: torch.Tensor, random: torch.Generator

@@ -134,8 +134,7 @@ def _named(scores_S_C: np.ndarray) -> np.ndarray:
 def _rows(
     readings: Iterable[Reading], samples: Registrations, named_S: np.ndarray, source: str, method: str, seed: int
 ) -> Iterator[Row]:
-    """Accuracies on the test samples that show the objects of each reading, and how often pose errors and missing
-    overlap are taken for each other."""
+    """Accuracies on test samples of the objects of each reading, and how often pose and overlap are confused."""
     train, test = (samples.rows(split) for split in ("train", "test"))
     seen_S = np.isin(samples.object_name[test], samples.object_name[train])
     shown = {"all": np.ones(len(test), bool), "seen": seen_S, "unseen": ~seen_S}
