@@ -33,7 +33,7 @@ from gpca.recovery.actions import FEWEST_POINTS, Action, Robot, action_of, look_
 from gpca.recovery.answers import learn_explainers
 from gpca.recovery.chances import learn_utility
 from gpca.recovery.episodes import Attempt, Episode, find_episodes, register_first
-from gpca.recovery.policies import Means, PolicyEntry, policy_entry
+from gpca.recovery.policies import Means, policy_entry
 from gpca.recovery.settings import LoopSettings, RecoverySettings
 from gpca.rigid import inverse
 from gpca.seeds import generator
@@ -72,12 +72,23 @@ def run(job: Job) -> None:
         rehearsed = find_episodes(tables["rehearsals"], rehearsals) if learning else []
         learner = next((entry.explainer for entry in entries if entry.learns or entry.queues), "")
         rehearsal = closed_loop.rehearse(rehearsed, actions, learner, explain[learner], loop) if learner else None
-        means = _means(recovery, entries, actions, registered, rehearsed, rehearsal, loop)
+        means = Means(closed_loop.robot_policy(recovery, rehearsal), tuple(actions))
         reenactor = closed_loop.Reenactor(settings.reenactment, settings.counterfactuals)
+        costs = recovery["costs"]
+        if rehearsal:
+            utility = learn_utility(rehearsal.trials.values(), costs, tuple(actions), recovery["needless"])
+            means = replace(means, utility=utility)
+        if any(entry.rehearsed for entry in entries):
+            failures = [episode for episode in rehearsed if episode.failed]
+            means = replace(means, order=closed_loop.rehearsed_order(failures, actions, costs, loop))
+        if any(entry.gated for entry in entries):
+            parts = registered | {"rehearsals": rehearsed}
+            means = replace(means, gate=closed_loop.rehearsed_gate(parts, recovery["gate"]["false_alarms"]))
         if any(entry.alarmed for entry in entries):
             fresh = [*registered["train"], *registered["test"], *rehearsed]  # of which it has learned nothing
-            alarm = closed_loop.calibrated_alarm(fresh, reenactor, recovery["gate"]["false_alarms"])
-            means = replace(means, alarm=alarm)
+            means = replace(
+                means, alarm=closed_loop.calibrated_alarm(fresh, reenactor, recovery["gate"]["false_alarms"])
+            )
         content = closed_loop.summary(means)
         print(json.dumps(content), file=sys.stderr)
         write_text(job.policy, json.dumps(content, indent=1, sort_keys=True) + "\n")
@@ -88,27 +99,6 @@ def run(job: Job) -> None:
         write_csv(job.timings, seconds)
         views = recovery["actions"].get(ACTION) or {}
         save_example(job.example, episodes, rows, {ACTION: action_of(ACTION, views)} | actions, views, loop, axes)
-
-
-def _means(
-    recovery: Mapping,
-    entries: Sequence[PolicyEntry],
-    actions: Mapping[str, Action],
-    registered: Mapping[str, Sequence[Episode]],
-    rehearsed: Sequence[Episode],
-    rehearsal: closed_loop.Rehearsal | None,
-    loop: LoopSettings,
-) -> Means:
-    """What the policies are made from; what none of them needs is not learned."""
-    costs, failures = recovery["costs"], [episode for episode in rehearsed if episode.failed]
-    utility = order = gate = None
-    if rehearsal:
-        utility = learn_utility(rehearsal.trials.values(), costs, tuple(actions), recovery["needless"])
-    if any(entry.rehearsed for entry in entries):
-        order = closed_loop.rehearsed_order(failures, actions, costs, loop)
-    if any(entry.gated for entry in entries):
-        gate = closed_loop.rehearsed_gate({**registered, "rehearsals": rehearsed}, recovery["gate"]["false_alarms"])
-    return Means(closed_loop.robot_policy(recovery, rehearsal), tuple(actions), utility, order or (), gate)
 
 
 def lay_tables(

@@ -20,7 +20,7 @@ from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.objects.canonical import ObjectClouds, drawn, unseen
 from gpca.pairs.dataset import Registrations, read_embedding
-from gpca.pairs.shifted_sets import SPACES, TRAINED_ON, ShiftedSets
+from gpca.pairs.shifted_sets import DISTANCES, TRAINED_ON, ShiftedSets
 from gpca.pairs.synthesis import RegistrationSettings, make_registrations
 from gpca.process.progress import progress
 from gpca.settings import Bounds, Count, OpenShare, read_settings
@@ -149,25 +149,19 @@ def make_sets(
 
 def _measured(parts: dict[str, Registrations], source: str, seed: int, settings: ShiftSettings) -> ShiftedSets:
     """Join sets of one encoder, the one with its training samples first, and measure the distances to these."""
-    spaces = {
-        "analytical": {
-            name: analytical_features(part, source, seed, "distance", name, shape_points=settings.shape_points)
-            for name, part in parts.items()
-        },
-        "embedding": {name: part.embedding for name, part in parts.items()},
+    analytical = {
+        name: analytical_features(part, source, seed, "distance", name, shape_points=settings.shape_points)
+        for name, part in parts.items()
     }
     home = next(iter(parts))
     train = parts[home].rows("train")
     joined, kept = [], ("split", "sample", "concept", "object_name", "cluster")
     for name, part in parts.items():
-        test = np.flatnonzero(part.split == "test")
-        distance_S_K = np.zeros((len(part), 2 * len(SPACES)))
-        for i, space in enumerate(SPACES):
-            features_N_F = spaces[space][home][train]
-            query_S_F = spaces[space][name][test]
-            if space == "embedding":
-                features_N_F, query_S_F = principal_components(features_N_F, query_S_F)
-            distance_S_K[test, 2 * i : 2 * i + 2] = distances(features_N_F, query_S_F, settings.neighbours)
+        test = part.rows("test")
+        by_shape = distances(analytical[home][train], analytical[name][test], settings.neighbours)
+        embedded = principal_components(parts[home].embedding[train], part.embedding[test])
+        distance_S_K = np.zeros((len(part), len(DISTANCES)))
+        distance_S_K[test] = np.hstack([by_shape, distances(*embedded, settings.neighbours)])
         columns = {column: getattr(part, column) for column in kept}
         joined.append(ShiftedSets(set=np.full(len(part), name), h=part.embedding, distance=distance_S_K, **columns))
     return ShiftedSets.joined(joined)

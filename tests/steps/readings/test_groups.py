@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gpca.active_learning.retraining import Retraining, learn
+from gpca.active_learning.rounds import make_task
 from gpca.attribution.learner_predictions import read_learner_predictions
 from gpca.attribution.predictions import write_predictions
 from gpca.classifier.gpc import GPC
@@ -166,9 +167,10 @@ def test_repeats_on_frames_vary_in_what_they_say(run_files, embedded, tmp_path):
 def test_the_cold_classifier_of_the_labels_is_the_protocols(run_files):
     choices = {"learning_rate": [0.1], "iterations": [20], "start": ["cold", "warm"], "inputs": ["labeled", "pool"]}
     found = rows_of(labels.classifiers, run_files, choices)
-    rare, target = labels.rare_settings(run_files)
+    base, rare, target = labels.label_settings(run_files)
     [(source, seed, registrations, _)] = run_files.in_distribution()
-    task, axes = labels.judged_task(run_files, registrations, source, seed)
+    axes = source, seed, labels.JUDGED
+    task = make_task(registrations, labels.NEW, base, source, seed, new_share=labels.JUDGED_SHARE)
     learned = learn(Retraining(task, rare.gpc, *axes), "bald_kmeans", rare, [target], *axes)
     of_cold = found[(0.1, 20, "cold", "labeled"), "bald_kmeans", "labels_to_target", "overlap"]
     assert of_cold == len(learned.labels_to(target))
