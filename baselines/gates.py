@@ -1,9 +1,8 @@
 """Gates: one number of the registration itself decides whether it is fine. They name no cause."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
+from typing import Self
 
 import numpy as np
 
@@ -25,7 +24,7 @@ class NominalThreshold:
 
     accuracy = 0.5
 
-    def fit(self, alarm_N: np.ndarray, label_N: np.ndarray) -> NominalThreshold:
+    def fit(self, alarm_N: np.ndarray, label_N: np.ndarray) -> Self:
         """Find the scale of the alarm, and the threshold with the best balanced accuracy; the median if undefined."""
         nominal_N = label_N == NOMINAL
         order = np.argsort(alarm_N, kind="stable")

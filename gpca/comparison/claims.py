@@ -317,13 +317,6 @@ def read_verdicts(path: str | Path) -> Frame:
 HEADS = {"claim": "The paper", "claim_verdict": "Verdict", "source": "Dataset", "table": "Samples"}
 HEADS |= {"compared": "Compared", "expected": "Expected", "verdict": "Holds"}
 _TESTS = {"greater": "greater", "less": "less", "not_worse": "not worse", "equivalent": "the same"}
-_RULE = (
-    "of differences of the same seed, or of accuracies the farther bounds of it and of one over clusters of objects or "
-    "scenes. A sentence is supported if all of its comparisons are, and refuted or smaller than the margin if one is, "
-    "by an interval that allows for their number. Smaller than the margin: not below 0, but below what is expected. "
-    "Floor: both are at the first labels, so the difference is unknown. Not worse and the same: the whole interval "
-    "lies within the margin. docs/comparison.md has the whole rule."
-)
 
 
 @dataclass(frozen=True)
@@ -372,7 +365,9 @@ def claims(verdicts: Frame, sources: Mapping[str, Mapping], titles: Mapping[str,
         columns={"difference": DifferenceColumn("First minus second, or their ratio", limits=(-math.inf, math.inf))},
         footnotes=(
             counted(verdicts),
-            f"In brackets: the 95 % interval over {seeds} {_RULE}",
+            f"In brackets: the 95 % interval over {seeds} of differences of the same seed, or of accuracies the "
+            "farther bounds of it and of one over clusters of objects or scenes. Floor: both are at the first labels, so "
+            "the difference is unknown. docs/appendix.md has the whole rule.",
             *margins_in_words(verdicts),
             *(f"Not run: {row.sentence} ({row.place}){': ' if row.note else ''}{row.note}." for row in not_run),
         ),

@@ -29,11 +29,9 @@ def comparison_markdown(comparison: Frame, tolerances: Mapping[str, Tolerance]) 
     far = ", ".join(f"{sign[unit]}{tolerance.close:g} ({unit})" for unit, tolerance in tolerances.items())
     parts.append(
         f"Reproduced: the mean here is within {near} of the printed number, or the 95 % interval of the difference "
-        f"contains 0. Close: within {far}. Inconclusive: the interval, which includes the paper's own sampling error "
-        "where known, reaches beyond what is close, but does not lie beyond it as a whole; n needed is the number of "
-        "seeds with the same mean and spread that would decide. Intervals are over seeds and samples with the objects "
-        "fixed, as those of a printed number are; what holds over objects stands beside them, and the counts say what "
-        "the verdicts would be by the farther bounds of both. docs/comparison.md has the whole rule."
+        f"contains 0. Close: within {far}. Inconclusive: the interval reaches beyond what is close, but does not lie "
+        "beyond it as a whole; n needed is the number of seeds with the same mean and spread that would decide. "
+        "Intervals are over seeds and samples with the objects fixed (docs/comparison.md)."
     )
     parts.append(f"Times of the paper were measured on {' and '.join(HARDWARE.values())}.")
     for table, rows in comparison.groupby("table", sort=False):

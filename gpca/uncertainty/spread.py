@@ -5,10 +5,9 @@ results have the covariance Σ, and the uncertainty is the divergence from that 
 u = KL(N(0, Σ_clean + εI) ‖ N(0, Σ + εI)). Lengths are relative to the object's diameter throughout.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from time import perf_counter
+from typing import Self
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -35,7 +34,7 @@ class Runs:
         """Return the source's mean squared distance to the target, cut off at the correspondence distance."""
         return clipped_cost(self.fitness_n, self.inlier_rmse_n, distance)
 
-    def chosen(self, rows_n: np.ndarray) -> Runs:
+    def chosen(self, rows_n: np.ndarray) -> Self:
         """Return these runs' results at the given rows, which may repeat."""
         names = ("T_target_source_n", "fitness_n", "inlier_rmse_n")
         return replace(self, **{name: getattr(self, name)[rows_n] for name in names})
