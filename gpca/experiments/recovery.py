@@ -251,15 +251,12 @@ def table8_recovery(
         f"is not off without its cause. {over_clusters(seeds, clusters='rendered tables')}. Bold: best of a column.",
         f"Acts on good: of {good} registrations on the same tables whose pose is right, those that the policy "
         "would change. Policies that know that a pose is wrong change all; the oracle knows of these too.",
-        f"To best sequence, to error only: paired differences of the shares within 1 and within {budget} actions, "
-        "with the 95 % interval of a bootstrap over tables and seeds that draws each failure for both. The best "
-        "sequence is the fixed one, repeats of one action included, that does best on these very failures. "
-        "Error only is the order that was best on the rehearsals: it knows that the pose is wrong, not why. "
-        "Policies that recognize failures themselves are compared with its gated form, which has to as well.",
+        f"To best sequence, to error only: paired differences of the shares within 1 and within {budget} actions. The "
+        "best sequence is the fixed one that does best on these very failures. Error only is the order that was best "
+        "on the rehearsals, gated for policies that recognize failures themselves.",
         f"Noise, Pose, Overlap: by cause, within {budget} actions. Queued: left to a person instead. Taken for "
-        "good: failures that the policy leaves as they are. Cost: of all actions on a failure, mean; the config "
-        "sets that of each action, and a repaired pose is worth 1. Seconds: of explaining, acting and registering, "
-        "per failure; the camera's and the robot's own times are not in them.",
+        "good: failures that the policy leaves as they are. Cost: of all actions on a failure; a repaired pose is "
+        "worth 1. Seconds: of explaining, acting and registering, without the camera's and the robot's own times.",
     )
     return sheet.table(f"Failed registrations recovered (%): {tables_title(run)}", "metric", notes, bold=within)
 

@@ -250,10 +250,9 @@ def table11_registration(run: Run, intervals, metrics, seconds):
     note = (
         "Lead: how many more succeed than by the best other method of the same start, pair by pair. "
         "Errors are means over all registrations, at the last pose of those that failed; rotations up to the object's "
-        "symmetries. Failed: given up by the method itself, or not at rest. Points: of a cloud, on average over "
-        "sources and targets; behind a global start, the local method's. ms: of one registration, with its global "
-        "start if it has one, without the normals; the only column that differs from run to run. Low, middle, high: "
-        "thirds of what is drawn; a pose error counts by the mean of its places in the two ranges."
+        "symmetries. Failed: given up by the method itself, or not at rest. Points: of a cloud, on average. ms: of one "
+        "registration, with its global start if it has one, without the normals; it differs from run to run. Low, "
+        "middle, high: thirds of what is drawn, a pose error by the mean of its places in the two ranges."
     )
     caption = "Registrations that succeed, and how far all are off" + run.stand_ins()
     return sheet.table(caption, "metric", [*notes(run, sheet, intervals), note], bold=CAUSES | ERRORS, same=1)

@@ -120,8 +120,6 @@ def table9_strata(run: Run, strata):
         "Right: share whose label is named, where for a failure any cause counts whose φ is within the limit of a "
         "cause of the largest. Regret: of the failed, the share of the error that removing the best single cause "
         "would take away and removing the named one does not; who names nominal removes nothing.",
-        f"Shown are {', '.join(chosen.values())}: what is not trained, GP-CA on the paper's input, the trained one "
-        "with the least regret, and the truth from other starts, which no observer has.",
     )
     caption = "Parts of the registrations with measured causes" + run.stand_ins()
     return sheet.table(caption, "explainer", notes)
@@ -131,9 +129,8 @@ def table9_strata(run: Run, strata):
     SECTION,
     "Table IX by the registration that is shown",
     """The truth is a mean over many starts, but an explainer is shown a single registration, which may be right where
-    the mean is not. Both are failures in their own right: of the pair, and of this registration. `gpca explain` says
-    of its result what the judge of the result says here; it learned from the errors that are shown, of other families,
-    the other explainers from the means.""",
+    the mean is not. `gpca explain` says of its result what the judge of the result says here, which learned from the
+    errors that are shown; the other explainers learned from the means.""",
     after="table9_strata",
     intervals="cause_intervals.csv",
 )
@@ -149,8 +146,7 @@ def table9_shown(run: Run, intervals):
     notes = (
         f"Mean: {counts['state_accuracy']:.0f} test samples whose mean error over starts is nominal or failed. "
         f"Shown: {counts['state_accuracy_shown']:.0f} whose registration, the one that the explainer sees, has an "
-        "error of its own below the nominal limit or above that of failures. The share of the failed whose own "
-        "registration did not fail stands in `table9_strata`.",
+        "error of its own below the nominal limit or above that of failures.",
         "State: mean share of the nominal and of the failed that is called so. AUROC: of failed against nominal. "
         f"All datasets and {plural(sheet.seeds, 'seed')} together. In brackets: the 95 % interval of "
         f"{REPEATS} bootstrap draws over objects and seeds. Bold: best explainer.",

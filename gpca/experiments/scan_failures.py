@@ -111,11 +111,10 @@ def table18_scan_causes(run: Run, measured):
         f"n: registrations that are nominal or failed, over {plural(sheet.seeds, 'seed')}. In brackets: the "
         f"95 % interval of {REPEATS} bootstrap draws over scenes. Too few: below {FEWEST_FAILURES} failed or "
         "nominal ones nothing is concluded, and no row is bold.",
-        "Learned from: objects, as in Table IX, or the other scenes of these data sets. AUROC: of failed against "
-        "nominal; over trivial: minus that of the best other gate (an alarm by a single number) or trivial row, "
-        "on the same draws, so that it is better where the interval is above 0. False "
-        "alarms: share of the nominal above the alarm that finds 90 % of the failed. State: mean share of the "
-        "nominal and of the failed that is called so.",
+        "Learned from: objects, as in Table IX, or the other scenes of these data sets. AUROC over trivial: minus that "
+        "of the best other gate (an alarm by a single number) or trivial row, on the same draws. False alarms: share "
+        "of the nominal above the alarm that finds 90 % of the failed. State: mean share of nominal and failed that is "
+        "called so.",
         f"Cause: mean over the causes by which {scans.FEWEST_OF_A_CAUSE} or more failed of the share whose cause has "
         "the largest score; who names no cause has none. Regret: as in Table IX.",
         tables.COST_NOTE,

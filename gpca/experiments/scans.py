@@ -269,9 +269,9 @@ def table17_scans(run: Run, intervals, seconds):
         blank=lambda row, key: key in rungs and row.labels[1][0] != INITIAL,
     )
     note = (
-        "Failed: given up by the method itself, or not at rest; the pose counts in the other columns all the same. "
-        "s: of one registration, with its global start if it has one, without voxels and normals; the only column "
-        "that differs from run to run. From: of the local registrations that start with that error of the pose."
+        "Failed: given up by the method itself, or not at rest; the pose counts in the other columns all the same. s: "
+        "with the global start, without voxels and normals; it differs from run to run. From: of the local "
+        "registrations that start with that error of the pose."
     )
     footnotes = [*_notes(run, sheet, intervals, strata), note]
     caption = "Registrations of scans that succeed, by overlap"

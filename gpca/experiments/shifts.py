@@ -255,10 +255,9 @@ def table9_shift(run: Run, measures):
         "metric",
         [
             *filter(None, [verdict]),
-            "As a user registers, and as `gpca explain` does: balanced accuracy where the observed cloud is moved. As "
-            f"learned: on the test samples of Table IX, where the model is. Mean over shifts: {titles}. Over trained: "
-            "the mean minus that of the best other explainer that is trained and reads no re-enactment, on the same "
-            "draws. False alarms and AUROC are means over the shifts, too.",
+            "As a user registers: balanced accuracy where the observed cloud is moved. As learned: on the test samples "
+            f"of Table IX, where the model is. Mean over shifts, also of false alarms and AUROC: {titles}. Over "
+            "trained: minus the best other explainer that is trained and reads no re-enactment, on the same draws.",
             "Knows: what is known of the generator of Table IX. Its samples: those that are learned from, of all "
             "sources together. Of a shift, the re-enactment is given the method and which cloud moved alone.",
             f"{sheet.over()} ({REPEATS} draws).",

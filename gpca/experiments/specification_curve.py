@@ -273,8 +273,7 @@ def table13_readings(run: Run, judged: Frame) -> Table:
             CHANCE: Column("Chance (%)", decimals=0, interval=False),
         },
         (
-            "Chance: the share of the span of a group's values, from Least to Most, that is close to one of its "
-            "readings: how likely a number from anywhere in it would be produced (docs/comparison.md). Of the "
+            "Chance: the share of the span from Least to Most that is close to a reading (docs/comparison.md). Of the "
             f"{len(every)} rows, {len(inside)} lie within the span of their group; "
             f"{sum(of.chance for of in inside):.1f} of these would be produced by chance. Produced are "
             f"{sum(of.close > 0 for of in every)}, also by readings beside the span.",

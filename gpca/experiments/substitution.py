@@ -192,10 +192,8 @@ def table14_estimator_explanations(run: Run, intervals):
         (
             f"{sheet.over()}. Shares of {sheet.samples(ALL)} test samples of all datasets together, "
             f"{sheet.samples(*CONCEPTS)} of each concept. Bold: best of an explainer.",
-            "The uncertainty is how far the covariance diverges from that of the untouched pair, as in Table I. As "
-            "with Monte-Carlo: share of the samples with the same answer.",
-            "Abstained: all concepts have the same value. No estimate: the estimator failed or refused under at least "
-            "one condition, and the sample counts as wrong.",
+            "As with Monte-Carlo: share of the samples with the same answer. Abstained: all concepts have the same "
+            "value. No estimate: the estimator failed under a condition, and the sample counts as wrong.",
         ),
         bold=[ALL],
         same=1,
