@@ -98,8 +98,8 @@ def collect(run: Run, causes_files: Paths, sample_files: Paths, prediction_files
         samples = read_csv(sample_file, SAMPLE_COLUMNS, others=ANY)
         samples = samples[[name for name in samples if name in SAMPLE_COLUMNS or name.startswith(FAILED_BY)]]
         require_same_samples(sample_file, samples, causes.registrations.arrays, "causes", ("sample",))
-        said = read_predictions(prediction_file, labels=("explainer",))
-        for explainer, rows in said.groupby("explainer", sort=False):
+        predicted = read_predictions(prediction_file, labels=("explainer",))
+        for explainer, rows in predicted.groupby("explainer", sort=False):
             require_same_samples(prediction_file, rows, causes.registrations.arrays, "causes", ("sample",))
             samples_of.setdefault(str(explainer), []).append(judged_by(rows, causes, seed))
         samples_of.setdefault(CEILING, []).append(ceiling_of(causes, seed))

@@ -14,13 +14,11 @@ from gpca.explainers.registry import explainer_entry
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD, conditions_of
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.sheet import Column, Row, Sheet, cell_of_repeats, crossed, plain_cell, show, where, with_label
-from gpca.reporting.words import dataset_in_words, plural
+from gpca.reporting.words import dataset_in_words
 
-PUBLISHED_NOTE = "readings of which architecture the paper used; they are not compared with what it prints."
 SCENES = "scenes"  # the clusters
 EVERYTHING_SEEN = {TOGETHER: "All (%)", SEEN: "Seen objects (%)", UNSEEN: "Unseen objects (%)"}
-POSES = {"results": "Pose estimators", "true_pose": "True pose, small error"}  # titles by form; all others:
-GLOBAL_POSE = "Global registration"
+POSES = {"results": "Pose estimators", "true_pose": "True pose, small error"}  # titles by form
 NUMBERS = {"intervals": "real_world_intervals.csv", "metrics": "real_world.csv"}
 SECTION = "IV-D Ablation studies"
 SPREAD: dict[str, Any] = {"decimals": 2, "interval": False, "limits": (0.0, inf)}
@@ -93,8 +91,7 @@ def table6_backbones(run: Run, intervals, metrics):
     heads = {"backbone": "Backbone", "reduction": "Reduction"}
     sheet = Sheet("table6_backbones", heads, rows, columns, intervals, more=more)
     shown = sheet.cells[0, "accuracy"]
-    few = max((cell.seeds for (row, _), cell in sheet.cells.items() if not sheet.rows[row].rival), default=shown.seeds)
-    fewer = f", over the first {plural(few, 'seed')}" if few < shown.seeds else ""
+    unjudged = f"{', '.join(published.values())}: readings of which architecture the paper used, not compared with it."
     reduction, encoder = section["reductions"][0], "pretrained encoder" if section["pretraining"] else "encoder"
     other = " without reduction" if reduction == "none" else f" with {REDUCTIONS[reduction]}"
     notes = (
@@ -104,7 +101,7 @@ def table6_backbones(run: Run, intervals, metrics):
         "the seeds of the accuracy.",
         f"{rival}: paired difference to it{other}. By concept: the share of its samples that is attributed to it. "
         "Parameters: of the encoder.",
-        *([f"{', '.join(published.values())}{fewer}: {PUBLISHED_NOTE}"] if published else ()),
+        *([unjudged] if published else ()),
     )
     caption = f"GP-CA by backbone and dimensionality reduction, accuracy (%) on {title_of_frames(run.config)}"
     return sheet.table(caption, "metric", notes, bold=["accuracy"], keep_empty=True)
@@ -121,7 +118,7 @@ def table6_seen_unseen(run: Run, intervals, metrics):
     section = run.config["real_world"]
     poses = {REAL_WORLD: section["initial_pose"]}
     poses |= {f"{REAL_WORLD}_{name}": entry for name, entry in conditions_of(run.config).items()}
-    conditions = {name: POSES.get(entry.get("form", ""), GLOBAL_POSE) for name, entry in poses.items()}
+    conditions = {name: POSES.get(entry.get("form", ""), "Global registration") for name, entry in poses.items()}
     embedded = (*frames.reduced_backbones(section), *frames.published_backbones(section))
     methods = {name: frames.encoder_title(*name.split("-")) for name in embedded} | CLASSIC
     methods |= run.titles(explainer_entry, section["explainers"])
