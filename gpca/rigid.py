@@ -18,6 +18,11 @@ def rotate(T_b_a: np.ndarray, vectors_a: np.ndarray) -> np.ndarray:
     return np.stack([x * to_x + y * to_y + z * to_z for to_x, to_y, to_z in T_b_a[:3, :3]], axis=-1)
 
 
+def dots(a_3: np.ndarray, b_3: np.ndarray) -> np.ndarray:
+    """Return the products (...,) of vectors (..., 3), summed from x to z on every processor."""
+    return a_3[..., 0] * b_3[..., 0] + a_3[..., 1] * b_3[..., 1] + a_3[..., 2] * b_3[..., 2]
+
+
 def rigid_motion(R_b_a: np.ndarray, translation: ArrayLike = (0.0, 0.0, 0.0)) -> np.ndarray:
     """Return the transforms (..., 4, 4) with these rotations (..., 3, 3) and translations (..., 3)."""
     T_b_a = np.zeros((*R_b_a.shape[:-2], 4, 4))

@@ -24,10 +24,9 @@ from gpca.causes.settings import FEWEST_POINTS, CauseSettings
 from gpca.causes.truth import NONE
 from gpca.io.frame import Frame
 from gpca.objects.canonical import DRAWN
-from gpca.pairs.distances import dots
 from gpca.pairs.perturbation import CONCEPTS, NOISE, OVERLAP, POSE
 from gpca.process.progress import progress
-from gpca.rigid import inverse, inverses, rigid_motion, rotate, rotation_angle_rad, transform
+from gpca.rigid import dots, inverse, inverses, rigid_motion, rotate, rotation_angle_rad, transform
 from gpca.scans.pair import ROOM_M, ScanPair, ScanSuccess
 from gpca.scans.scene import ScanPairs
 from gpca.seeds import generator

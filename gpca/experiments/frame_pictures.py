@@ -11,7 +11,7 @@ from gpca.errors import InputError
 from gpca.experiments.confusions import draw_confusions
 from gpca.experiments.frames import encoder_title, read_together, title_of_frames
 from gpca.experiments.registration_stages import draw_scores, source_before_icp
-from gpca.frames.instances import Instances
+from gpca.frames.instances import NO_COLOR, Instances
 from gpca.frames.synthesis import HALF_SPACE, OCCLUDER
 from gpca.io.container import require_same_samples
 from gpca.io.csv_file import numbers, read_csv
@@ -60,7 +60,7 @@ def draw_real_world_example(
     instances, objects = Instances.load(instances_npz), ObjectClouds.load(objects_npz)
     registrations = Registrations.load(registrations_npz)
     samples = read_samples(poses_csv, predictions_csv)
-    shown_px = np.where(instances.is_colored, np.diff(instances.offsets), 0)
+    shown_px = np.where(instances.colour != NO_COLOR, np.diff(instances.offsets), 0)
     row = choose_sample(samples, predictions_csv, shown_px, success)
     sample, diameter_m = samples.iloc[row], registrations.diameter_m[row]
     i = int(sample["instance"])

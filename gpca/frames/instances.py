@@ -68,11 +68,6 @@ class Instances(Container):
         return Sighting(self.cloud_m(i).astype(np.float64), self.pixels_of(i), self.camera_3_3[i])
 
     @property
-    def is_colored(self) -> np.ndarray:
-        """(I,) the frame has a color image."""
-        return self.colour != NO_COLOR
-
-    @property
     def cluster(self) -> np.ndarray:
         """(I,) the scene, whose frames show the same objects in the same poses."""
         return np.array([f"{dataset} {scene}" for dataset, scene in zip(self.dataset, self.scene, strict=True)])

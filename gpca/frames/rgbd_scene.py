@@ -92,13 +92,10 @@ def write_scenes(surfaces: Iterable[Surface], source: str, settings: SceneSettin
         for number, surface in enumerate(surfaces, start=1):
             mesh = trimesh.Trimesh(1e3 * surface.vertices_m, surface.faces, process=False)
             mesh.export(partial / f"models/obj_{number:06d}.ply")
-            low, high = mesh.bounds
             cloud_m, _, diameter_m = canonical_cloud(surface, source, 4096)
             info[number] = {
                 "name": surface.name,
                 "diameter": 1e3 * diameter(surface.vertices_m, surface.name),
-                **{f"min_{axis}": value for axis, value in zip("xyz", low.tolist(), strict=True)},
-                **{f"size_{axis}": value for axis, value in zip("xyz", (high - low).tolist(), strict=True)},
                 **find_symmetries(cloud_m, diameter_m),
             }
         _write_json(partial / "models/models_info.json", info)
@@ -179,16 +176,12 @@ def _write_scene(folder: Path, surfaces, standing: list[Placed], views, settings
             mask = np.where(view.mesh == n, 255, 0).astype(np.uint8)
             Image.fromarray(mask).save(folder / f"mask_visib/{image:06d}_{n:06d}.png")
             T_camera_object = inverse(T_world_camera) @ object_.T_world_object
-            truth_json[image].append({"obj_id": object_.model + 1, **_pose(T_camera_object, "m2c")})
+            rotation, translation_mm = T_camera_object[:3, :3].ravel().tolist(), (1e3 * T_camera_object[:3, 3]).tolist()
+            pose = {"cam_R_m2c": rotation, "cam_t_m2c": translation_mm}
+            truth_json[image].append({"obj_id": object_.model + 1, **pose})
         camera_json[image] = {"cam_K": settings.camera.matrix_3_3.ravel().tolist(), "depth_scale": DEPTH_SCALE}
-        camera_json[image] |= _pose(inverse(T_world_camera), "w2c")
     for name, content in (("camera", camera_json), ("gt", truth_json)):
         _write_json(folder / f"scene_{name}.json", content)
-
-
-def _pose(T: np.ndarray, frames: str) -> dict[str, list[float]]:
-    rotation, translation_mm = T[:3, :3].ravel().tolist(), (1e3 * T[:3, 3]).tolist()
-    return {f"cam_R_{frames}": rotation, f"cam_t_{frames}": translation_mm}
 
 
 def model_color(model: int, count: int) -> tuple[float, float, float]:

@@ -21,14 +21,13 @@ from gpca.causes.truth import SUBSETS, capped
 from gpca.errors import InputError
 from gpca.numerals import in_decimals
 from gpca.objects.canonical import thin
-from gpca.pairs.distances import dots
 from gpca.pairs.perturbation import OVERLAP
 from gpca.reenactment.enactment import Enactment, NoiseScale
 from gpca.reenactment.hypotheses import INDEPENDENT, NEGLIGIBLE, Hypothesis, find_hypotheses
 from gpca.reenactment.scans import cropped
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
-from gpca.rigid import exp, inverse, inverses, rotate, scale_translation, transform
+from gpca.rigid import dots, exp, inverse, inverses, rotate, scale_translation, transform
 from gpca.scans.pair import MOST_CELLS, voxels
 from gpca.seeds import generator, seed_of
 from gpca.uncertainty.estimators.interface import CovarianceEstimate, RegisteredPair

@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 
 from gpca.process.environment import require_open3d
-from gpca.rigid import rigid_motion, rotate
+from gpca.rigid import dots, rigid_motion, rotate
 from gpca.settings import Bounds, Positive
 
 Pixels = Annotated[int, Bounds(minimum=16, maximum=4096)]
@@ -76,12 +76,12 @@ class MeshScene:
         face = np.where(hit, self._first_face[mesh] + hits["primitive_ids"].numpy(), 0)
         normals = self._normal_F_3[face] * hit[..., None]
         # Where the ray meets the face's plane: Embree divides by the processor's own approximate reciprocal.
-        height_m = self._offset_F_m[face] - _dot(normals, T_world_camera[:3, 3])
+        height_m = self._offset_F_m[face] - dots(normals, T_world_camera[:3, 3])
         depth_m = np.full(hit.shape, np.inf)
-        np.divide(height_m, _dot(normals, rotate(T_world_camera, rays_H_W_3)), out=depth_m, where=hit)
+        np.divide(height_m, dots(normals, rotate(T_world_camera, rays_H_W_3)), out=depth_m, where=hit)
         normals = rotate(T_world_camera[:3, :3].T, normals)
         to_camera = -rays_H_W_3 / np.linalg.norm(rays_H_W_3, axis=-1, keepdims=True)
-        cosine = _dot(normals, to_camera)
+        cosine = dots(normals, to_camera)
         normals *= np.where(cosine < 0, -1, 1)[..., None]
         return View(depth_m, mesh, np.abs(cosine), normals)
 
@@ -98,11 +98,7 @@ def planes(corners_F_3_3: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     across = np.cross(b - a, c - a)
     lengths = np.linalg.norm(across, axis=1, keepdims=True)
     normal_F_3 = np.divide(across, lengths, out=np.zeros_like(across), where=lengths > 0)
-    return normal_F_3, _dot(normal_F_3, a)
-
-
-def _dot(a_3: np.ndarray, b_3: np.ndarray) -> np.ndarray:
-    return a_3[..., 0] * b_3[..., 0] + a_3[..., 1] * b_3[..., 1] + a_3[..., 2] * b_3[..., 2]
+    return normal_F_3, dots(normal_F_3, a)
 
 
 @dataclass(frozen=True)

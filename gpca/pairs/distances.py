@@ -12,7 +12,7 @@ from gpca.alignment.icp import ICPSettings, clipped_cost
 from gpca.alignment.pose_error import displacements
 from gpca.pairs.dataset import Registrations
 from gpca.process.progress import progress
-from gpca.rigid import inverse, log
+from gpca.rigid import dots, inverse, log
 from gpca.seeds import generator
 
 LEVELS = np.array([0.01, *np.arange(1, 12) / 12, 0.99])  # of quantiles; the very ends belong to single points
@@ -87,11 +87,6 @@ def second_moments(offsets_N_k_3: np.ndarray) -> np.ndarray:
     x, y, z = np.moveaxis(offsets_N_k_3, -1, 0)
     rows = [[(a * b).sum(axis=1) for b in (x, y, z)] for a in (x, y, z)]
     return np.moveaxis(np.array(rows), -1, 0)
-
-
-def dots(a_N_3: np.ndarray, b_N_3: np.ndarray) -> np.ndarray:
-    """Return the products (N,) of rows, summed from x to z."""
-    return a_N_3[:, 0] * b_N_3[:, 0] + a_N_3[:, 1] * b_N_3[:, 1] + a_N_3[:, 2] * b_N_3[:, 2]
 
 
 @dataclass(frozen=True)

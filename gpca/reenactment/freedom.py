@@ -11,9 +11,9 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.spatial import cKDTree
 
-from gpca.pairs.distances import dots, second_moments
+from gpca.pairs.distances import second_moments
 from gpca.reenactment.mixture import Mixture
-from gpca.rigid import exp, point_jacobians
+from gpca.rigid import dots, exp, point_jacobians
 
 NEIGHBORS = 12  # of a point, every second of which spans one of its two planes
 STEPS = np.array([0.06, 0.12])  # diameters that a pose is moved,

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gpca.pairs.distances import dots, second_moments
+from gpca.pairs.distances import second_moments
 from gpca.reenactment.hypotheses import INDEPENDENT, LEAST_COVERED, find_hypotheses
 from gpca.reenactment.mixture import Mixture
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface, share_within, trimmed_square
-from gpca.rigid import best_motion, exp, rotate, transform
+from gpca.rigid import best_motion, dots, exp, rotate, transform
 
 STARTS = (0.5, 0.72, 1.0, 1.4, 2.0)
 FEW, STEPS, LAST_STEPS = 128, 8, 6  # points and steps of all starts; steps of the best, with all points
@@ -80,9 +80,9 @@ def scale_of(
     mixture = Mixture(surface.points, surface.spacing / 2)
     rows = np.linspace(0, len(placed[0]) - 1, min(FEW, len(placed[0]))).astype(int)
     few = [points[rows] for points in placed]
-    ends, factor_B = _settled(
-        np.stack([_scaled(points, start) for points in few for start in STARTS]), surface, REACHES, STEPS
-    )
+    starts = [(points, np.median(points, axis=0), start) for points in few for start in STARTS]
+    scaled = np.stack([center + start * (points - center) for points, center, start in starts])
+    ends, factor_B = _settled(scaled, surface, REACHES, STEPS)
     factor_B *= np.tile(STARTS, len(few))
     posterior_B = [_log_posterior(*end, mixture, surface, random) for end in zip(ends, factor_B, strict=True)]
     best = int(np.argmax(posterior_B))
@@ -100,11 +100,6 @@ def scale_of(
     if nats < convincing:
         return Scale(1.0, nats)
     return Scale(_scale_of_model(last[0], surface, random) / factor, nats)
-
-
-def _scaled(points: np.ndarray, factor: float) -> np.ndarray:
-    center = np.median(points, axis=0)
-    return center + factor * (points - center)
 
 
 def _log_posterior(

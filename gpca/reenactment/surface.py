@@ -10,9 +10,10 @@ from scipy.spatial import cKDTree
 from gpca.alignment.batched_icp import make_target
 from gpca.causes.truth import LARGEST_ERROR
 from gpca.objects.bop import find_symmetries
-from gpca.pairs.distances import dots, second_moments
+from gpca.pairs.distances import second_moments
 from gpca.reenactment.regions import DIRECTIONS, Regions, directions
 from gpca.reenactment.surface_kernels import nearest_rows, shares_within, surface_distances
+from gpca.rigid import dots
 
 JUDGED = 256  # points over which an error is the mean
 COMPARED = 64  # points that tell whether two poses are the same
