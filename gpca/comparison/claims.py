@@ -366,8 +366,8 @@ def claims(verdicts: Frame, sources: Mapping[str, Mapping], titles: Mapping[str,
         footnotes=(
             counted(verdicts),
             f"In brackets: the 95 % interval over {seeds} of differences of the same seed, or of accuracies the "
-            "farther bounds of it and of one over clusters of objects or scenes. Floor: both are at the first labels, so "
-            "the difference is unknown. docs/appendix.md has the whole rule.",
+            "farther bounds of it and of one over clusters of objects or scenes. Floor: both are at the first labels, "
+            "so the difference is unknown. docs/appendix.md has the whole rule.",
             *margins_in_words(verdicts),
             *(f"Not run: {row.sentence} ({row.place}){': ' if row.note else ''}{row.note}." for row in not_run),
         ),
