@@ -24,10 +24,7 @@ configfile: DEFAULTS[2]
 with one_line():
     config, SOURCES = read(config, given.config, module.skip_configfile)
 export_to_jobs(config)
-clear_leftovers(
-    [workflow.snakemake_tmp_dir, workflow.sourcecache.runtime_cache_path],
-    workflow.is_main_process,
-)
+clear_leftovers(workflow.is_main_process)
 
 
 pathvars:

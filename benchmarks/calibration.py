@@ -86,14 +86,14 @@ def compared(diagnoser, diagnoses: Sequence, right: Sequence[bool]) -> dict[str,
 
     from gpca.model.calibration import RIGHT, WRONG, LabeledRegistrations
     from gpca.model.diagnosis import state_probabilities
-    from gpca.model.result import calibrated_at
+    from gpca.model.result import level_at
     from gpca.seeds import generator
 
     known = [number for number, diagnosis in enumerate(diagnoses) if not diagnosis.void]
     diagnoses, right_N = [diagnoses[number] for number in known], np.array(right)[known]
     causes_N_3 = np.array([[*diagnosis.causes.values()] for diagnosis in diagnoses])
     scores_N_5 = state_probabilities(causes_N_3, np.array([diagnosis.result for diagnosis in diagnoses]))
-    own = calibrated_at(diagnoser.levels, diagnoses[0].tolerance_share).guarantee
+    own = level_at(diagnoser.levels, diagnoses[0].tolerance_share).guarantee
     print(f"{len(known)} registrations of a known state, {right_N.sum()} right; mean (5 to 95 % of the draws)")
     print(f"{'labeled':>7}", *(f"{name:>24}" for name in MEASURES))
     result = {"samples": len(known), "right": int(right_N.sum())}

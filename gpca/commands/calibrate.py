@@ -5,7 +5,7 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from dataclasses import replace
 from pathlib import Path
 
-from gpca.commands.explain_inputs import COLUMNS, FILES, from_rows, inputs_in, target_reader
+from gpca.commands.explain import COLUMNS, FILES, from_rows, inputs_in, target_reader
 from gpca.errors import InputError
 from gpca.io.files import require_apart
 from gpca.model.clouds import require_format
@@ -63,12 +63,8 @@ def run_calibrate(options: Namespace) -> None:
     from gpca.model.result import Tolerance
     from gpca.process.progress import progress
 
-    tolerance, explainer, read_target = (
-        Tolerance.parse(options.tolerance),
-        Explainer(Model.load(path)),
-        target_reader(False),
-    )
-    diagnoses = []
+    tolerance, explainer, diagnoses = Tolerance.parse(options.tolerance), Explainer(Model.load(path)), []
+    read_target = target_reader(False)
     for place, each in zip(names, progress(inputs, "explaining", unit=" pairs"), strict=True):
         try:
             given = each.read(read_target)

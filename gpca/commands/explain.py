@@ -2,33 +2,117 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import sys
 from argparse import Action, ArgumentParser, Namespace
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from functools import partial
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache, partial
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gpca.commands.explain_inputs import COLUMNS, FILES, Inputs, from_rows, from_words, inputs_in, target_reader
-from gpca.errors import InputError
-from gpca.io.files import printable, require_apart
+import numpy as np
+
+from gpca.errors import InputError, refusing, require_known
+from gpca.io.files import printable, require_apart, require_file
 from gpca.jobs.arguments import length
+from gpca.model.clouds import read_points, read_pose, read_target
 from gpca.model.location import model_path, require_model
-from gpca.objects.surface import METERS_PER_UNIT
+from gpca.objects.canonical import CanonicalFrame
+from gpca.objects.sizes import AS_OPTIONS, extent, require_sizes
+from gpca.objects.surface import METERS_PER_UNIT, measured
 
 if TYPE_CHECKING:
     from gpca.model.explainer import Explainer
     from gpca.model.explanation import ExplainedRegistration, Explanation
 
+COLUMNS = ("source", "target")  # of a CSV of pairs; optional ones are init or pose, unit and source_unit
+FILES = (*COLUMNS, "init", "pose")
+USED = (*FILES, "unit", "source_unit", "label", "group")
+TargetReader = Callable[[Path], tuple[np.ndarray, CanonicalFrame | None]]
+PAIRS_REMEDY = "give the columns source and target, and perhaps init or pose, unit and source_unit"
 FAULTY_STATUS = 2  # exit code; 1 is a failed check
 FORMATS = "PLY, PCD, OBJ, STL, OFF, VTK, glb, npy, npz, xyz, txt, asc, pts, csv, bin of KITTI or nuScenes"
 FIGURE = "gpca.model.explanation_figure"  # by name: only this needs matplotlib
 OBJECT_OPTIONS = ("model", "fast", "queue", "png", "repair")  # they need a model of objects
 OF_ONE = ("html", "png", "save_pose", "out")  # outputs of one registration
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """The files of one registration."""
+
+    source: Path
+    target: Path
+    start: Path | None  # pose from which to register, or to judge
+    unit: str  # of the target, the pose and the results
+    source_unit: str | None  # None: the same
+    judged: bool = False  # whether the pose is judged as it is
+
+    def read(self, read_target: TargetReader) -> dict[str, Any]:
+        """Return the arguments of the function that explains; InputError for a fault of a file."""
+        T_init = read_pose(self.start) if self.start else None
+        source = read_points(self.source)
+        given: dict[str, Any] = {"source_points": source, "T_target_source_init": T_init, "unit": self.unit}
+        if self.source_unit not in (None, self.unit):
+            given["source_unit"] = self.source_unit
+        target, frame = read_target(self.target)
+        if frame is not None:
+            extents = extent(measured(source, self.source)), extent(measured(target, self.target))
+            units = self.source_unit or self.unit, self.unit
+            require_sizes((self.source, self.target), extents, frame.diameter, units, AS_OPTIONS)
+            given["frame"] = frame
+        if self.judged:
+            given |= {"T_target_source": T_init} if frame is None else {"register": False}
+        return given | {"target_points": target}
+
+
+def target_reader(scans: bool) -> TargetReader:
+    """Return what reads the points and the frame of a target, but not twice in a row; scans have no frame."""
+    return lru_cache(maxsize=1)((lambda path: (read_points(path), None)) if scans else read_target)
+
+
+def from_rows(options: Namespace, columns: Sequence[str] = COLUMNS) -> list[tuple[str, dict[str, str]]]:
+    """Return the rows of a CSV of pairs, each with its place; InputError if it has none or lacks a column."""
+    path = options.pairs
+    require_file(path, "no such file", PAIRS_REMEDY)
+    with refusing(path, "is not a readable CSV file ({})", PAIRS_REMEDY), path.open(encoding="utf-8-sig") as file:
+        table = csv.DictReader(file, skipinitialspace=True)
+        rows = [(f"{path}, line {table.line_num}", row) for row in table]
+    names = list(table.fieldnames or ())
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise InputError(path, f"column '{twice[0]}' occurs twice", PAIRS_REMEDY)
+    if broken := [place for place, row in rows if "\0" in "".join(map(str, row.values()))]:
+        raise InputError(broken[0], "has a zero byte", "write it anew")
+    if unused := [name for name in names if name not in USED]:
+        print(f"{path}: the column '{printable(unused[0])}' is not used", file=sys.stderr)
+    if missing := [column for column in columns if column not in names]:
+        raise InputError(path, f"column '{missing[0]}' is missing", PAIRS_REMEDY)
+    if not rows:
+        raise InputError(path, "has no rows", PAIRS_REMEDY)
+    return rows
+
+
+def inputs_in(row: dict[str, str], options: Namespace) -> Inputs:
+    """Return the files of a row, whose paths are relative to the CSV, and whose units are first those of its own."""
+    entries = {name: (row.get(name) or "").strip() for name in (*FILES, "unit", "source_unit")}
+    if None in row:
+        raise InputError("row", "has more entries than columns", "quote entries with commas")
+    for name in COLUMNS:
+        if not entries[name]:
+            raise InputError(name, "is missing", "name a file")
+    units = [entries[name] or getattr(options, name) for name in ("unit", "source_unit")]
+    for unit in filter(None, units):
+        require_known("unit", unit, METERS_PER_UNIT)
+    folder = options.pairs.parent
+    source, target = (folder / entries[name] for name in COLUMNS)
+    if entries["pose"] and (entries["init"] or options.method):
+        raise InputError("pose", "is judged as it is, without init or --method", "leave one of them out")
+    start = entries["pose"] or entries["init"]
+    return Inputs(source, target, folder / start if start else None, units[0], units[1], bool(entries["pose"]))
 
 
 class _InsteadOfClouds(Action):
@@ -83,10 +167,7 @@ def add_registration_arguments(parser: ArgumentParser, given_pose: str) -> None:
 
 
 def run_explain(options: Namespace) -> int:
-    """Read all files, then explain and print one source after the other; everything but results goes to stderr.
-
-    Returns 2 if a source or row of several has a fault, else the largest status of an explanation or a repair.
-    """
+    """Explain one source after the other; return 2 if one of several has a fault, else the largest status."""
     _require_options(options)
     path = None if options.scans else model_path(options.model)
     if path is not None:
@@ -98,30 +179,12 @@ def run_explain(options: Namespace) -> int:
         from gpca.active_learning.labeling import require_queue
 
         require_queue(options.queue)
-    inputs = [] if options.pairs else from_words(options)
     read_target = target_reader(options.scans)
-    statuses, given = {0}, []
-
-    @contextmanager
-    def its_line(source: object, target: object, place: str = "") -> Iterator[None]:
-        """With lines of JSON, a fault of one source is its line, and the others go on."""
-        try:
-            yield
-        except InputError as fault:
-            if not options.json_lines:
-                raise
-            statuses.add(FAULTY_STATUS)
-            names = {"source": printable(source), "target": printable(target)}
-            print(json.dumps(names | {"error": str(fault)}), flush=True)
-            print(f"gpca {options.command}: {place}{fault}", file=sys.stderr)
-
-    if inputs:
+    pairs: list[tuple] = [(f"{place}: ", row) for place, row in rows]
+    if not options.pairs:
         read_target(options.target)
-    for each in inputs:
-        with its_line(each.source, each.target):
-            given.append((each, each.read(read_target)))
-    if not given and not rows:
-        return FAULTY_STATUS
+        start, units = options.pose or options.init, (options.unit, options.source_unit)
+        pairs = [("", Inputs(source, options.target, start, *units)) for source in options.source]
     # Unknown methods and estimators are reported here, so that no message blames a file for them.
     if options.method is not None:
         from gpca.alignment.methods.registry import make_method
@@ -139,7 +202,6 @@ def run_explain(options: Namespace) -> int:
     explain: Callable[..., ExplainedRegistration]
     learned, names, extra = LEARNED, dict[str, str](), dict[str, str]()
     if path is None:
-        from gpca.model.clouds import read_pose
         from gpca.model.scan_explainer import explain_scans, repair_scans
 
         explain = partial(
@@ -174,27 +236,29 @@ def run_explain(options: Namespace) -> int:
                 **common,
             )
 
-    def explain_one(each: Inputs, arguments: dict[str, Any]) -> None:
-        try:
-            explanation = explain(**arguments)
-        except InputError as fault:
-            raise InputError(each.source, str(fault)) from fault
-        files = {"source": printable(each.source), "target": printable(each.target)}
-        _write(options, explanation, files | names, extra)
-        statuses.add(explanation.status)
-        if isinstance(explanation, Explanation):
-            _queue(options.queue, explainer, explanation, " to ".join(files.values()))
-
-    for each, arguments in given:
-        with its_line(each.source, each.target):
-            explain_one(each, arguments)
     from gpca.process.progress import progress
 
-    for place, row in progress(rows, "pairs", unit=" pairs") if rows else ():
-        source, target = (options.pairs.parent / (row.get(name) or "") for name in COLUMNS)
-        with its_line(source, target, f"{place}: "):
-            each = inputs_in(row, options)
-            explain_one(each, each.read(read_target))
+    statuses = []
+    for place, given in progress(pairs, "pairs", unit=" pairs") if rows else pairs:
+        named = {name: options.pairs.parent / (given[name] or "").strip() for name in COLUMNS} if rows else vars(given)
+        files = {name: printable(named[name]) for name in COLUMNS}
+        try:
+            arguments = (inputs_in(given, options) if rows else given).read(read_target)
+            try:
+                explanation = explain(**arguments)
+            except InputError as fault:
+                raise InputError(files["source"], str(fault)) from fault
+            _write(options, explanation, files | names, extra)
+            if isinstance(explanation, Explanation):
+                _queue(options.queue, explainer, explanation, " to ".join(files.values()))
+        except InputError as fault:  # with lines of JSON, it is a line of its own, and the others go on
+            if not options.json_lines:
+                raise
+            statuses.append(FAULTY_STATUS)
+            print(json.dumps(files | {"error": str(fault)}), flush=True)
+            print(f"gpca {options.command}: {place}{fault}", file=sys.stderr)
+        else:
+            statuses.append(explanation.status)
     print(learned, file=sys.stderr)
     return FAULTY_STATUS if FAULTY_STATUS in statuses else max(statuses)
 
@@ -213,24 +277,24 @@ def _length(text: str, unit: str) -> float:
 
 
 def _require_options(options: Namespace) -> None:
+
+    def refuse(names: Iterable[str], fault: str, remedy: str = "leave it out") -> None:
+        for name in names:
+            if getattr(options, name) not in (None, False):
+                raise InputError(f"--{name.replace('_', '-')}", fault, remedy)
+
     if options.pairs:
         if options.source or not options.json_lines:
             fault = "has sources and targets of its own" if options.source else "prints one line for each pair"
             raise InputError("--pairs", fault, "leave out the others" if options.source else "add --json-lines")
         options.source = []
-        for name in ("init", "pose", *OF_ONE):
-            if getattr(options, name):
-                raise InputError(f"--{name.replace('_', '-')}", "is not for --pairs", "leave it out")
-    if len(options.source) > 1 and not options.json_lines:
-        raise InputError(options.command, f"{len(options.source)} sources need one line each", "add --json-lines")
-    for name in OBJECT_OPTIONS if options.scans else ("voxel",):
-        if (given := getattr(options, name)) is not None and given is not False:
-            fault = "is not for scans" if options.scans else "is for scans alone"
-            raise InputError(f"--{name}", fault, "leave it out" if options.scans else "add --scans")
-    for name in OF_ONE:
-        if getattr(options, name) and len(options.source) > 1:
-            fault = f"--{name.replace('_', '-')}"
-            raise InputError(fault, "is for one source", f"{options.command} one source after the other")
+        refuse(("init", "pose", *OF_ONE), "is not for --pairs")
+    if len(options.source) > 1:
+        if not options.json_lines:
+            raise InputError(options.command, f"{len(options.source)} sources need one line each", "add --json-lines")
+        refuse(OF_ONE, "is for one source", f"{options.command} one source after the other")
+    refuse(OBJECT_OPTIONS if options.scans else (), "is not for scans")
+    refuse(() if options.scans else ("voxel",), "is for scans alone", "add --scans")
     for name in ("init", "method"):
         if options.pose and getattr(options, name):
             raise InputError("--pose", f"is judged as it is, without --{name}", "leave one of them out")

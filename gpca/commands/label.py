@@ -97,14 +97,12 @@ def run_label(options: Namespace) -> None:
         require_file(options.answers, "no such file", remedy, LARGEST_BYTES)
         with refusing(options.answers, "is not text in UTF-8 ({})", remedy):
             answers = io.StringIO(options.answers.read_text(encoding="utf-8-sig"))
-    questions_asked = 0
+    left = options.questions
     print(f"{len(start)} labeled at the start, {len(session.answered)} answered before, {len(keys)} samples")
     print("answer with a concept or with " + ", ".join(f"{name} ({what})" for name, what in COMMANDS.items()))
-    while questions_asked < options.questions and (
-        questions := session.ask(min(options.batch, options.questions - questions_asked))
-    ):
+    while left and (questions := session.ask(min(options.batch, left))):
         for question in questions:
-            questions_asked += 1
+            left -= 1
             answer = _ask(session, registrations, question, options.picture, answers)
             if answer in (None, "/quit"):
                 return _finish(session, registrations, model, options)
@@ -147,16 +145,14 @@ def _ask(
         if answer == "/retrain":
             _retrain(session)
             continue
-        if answer in COMMANDS:
-            return answer
         try:
-            require_name(answer)
+            if answer not in COMMANDS:
+                require_name(answer)
+            return answer
         except InputError as fault:
-            if answers is not sys.stdin or not sys.stdin.isatty():
+            if not answers.isatty():
                 raise
             print(f"  {fault}")
-            continue
-        return answer
 
 
 def _retrain(session: Session) -> None:

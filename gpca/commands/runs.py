@@ -19,11 +19,7 @@ def add_check_config_arguments(parser: ArgumentParser) -> None:
 
 
 def run_check_config(options: Namespace) -> int:
-    """Merge the configs into the default and check the result: all faults are lines on stderr, with status 2.
-
-    Snakemake reads the files of ``--configfile`` before the suite does, so files that it cannot read end in its own
-    messages.
-    """
+    """Merge the configs into the default and check the result: all faults are lines on stderr, with status 2."""
     from gpca.config.check import check
     from gpca.config.layers import read_file, with_defaults
 
@@ -56,12 +52,8 @@ def add_check_reference_arguments(parser: ArgumentParser) -> None:
     add = parser.add_argument
     add("folder", type=Path, help="folder of the run, such as results/full")
     add("--reference", type=Path, help="its reference (default: reference/ and the same name, beside the run)")
-    add(
-        "--config",
-        type=Path,
-        default=CONFIG,
-        help=f"config whose section 'reference' sets the tolerances (default: {CONFIG})",
-    )
+    config = f"config whose section 'reference' sets the tolerances (default: {CONFIG})"
+    add("--config", type=Path, default=CONFIG, help=config)
 
 
 def run_check_reference(options: Namespace) -> int:
@@ -80,9 +72,8 @@ def run_check_reference(options: Namespace) -> int:
     if not isinstance(section, dict):
         raise InputError(config, "has no section 'reference'", f"name another file with --config, such as {CONFIG}")
     subject = "setting" if options.settings else f"{config}: setting"
-    outcomes = checks.check_reference(
-        folder, reference, read_settings(checks.Allowance, section | options.settings, subject)
-    )
+    allowance = read_settings(checks.Allowance, section | options.settings, subject)
+    outcomes = checks.check_reference(folder, reference, allowance)
     width = max(len(outcome.file) for outcome in outcomes)
     for outcome in outcomes:
         print(f"{outcome.file:<{width}}  {outcome.verdict:<9}  {outcome.detail}".rstrip())

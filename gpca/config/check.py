@@ -124,10 +124,7 @@ def _check_registrations(config: dict) -> None:
 
 
 def _check_names(config: dict, left_out: LeftOut, noted: Callable[[], AbstractContextManager]) -> None:
-    """Check the names of encoders, explainers and sources, and the points that encoders and explainers read.
-
-    Draws of points from depth frames are not checked: smaller clouds repeat points.
-    """
+    """Check the names of encoders, explainers and sources, and the points of clouds that these read."""
     encoders, points = config["encoders"], config["registrations"]["cloud_points"]
     for name, encoder in encoders.items():
         with noted():

@@ -1,8 +1,4 @@
-"""The environment that jobs inherit from the process that plans them, and the leftovers of killed runs.
-
-Snakemake's lock outlives a killed process, and every later start ends with a LockException until ``--unlock``. So
-each Snakemake also holds a kernel lock, which ends with the process.
-"""
+"""The environment that jobs inherit from the process that plans them, and the leftovers of killed runs."""
 
 import fcntl
 import json
@@ -10,7 +6,7 @@ import os
 import shutil
 import sys
 import sysconfig
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import IO
@@ -44,13 +40,12 @@ def export_to_jobs(config: Mapping, source_folder: str | Path = ROOT) -> None:
     pin_instructions()
 
 
-def clear_leftovers(temporary: Sequence[str | Path], main: bool = True, folder: str | Path = ".snakemake") -> None:
+def clear_leftovers(main: bool = True, folder: Path = Path(".snakemake")) -> None:
     """Lock the working directory, and clear the leftovers of killed Snakemakes if no other one is running.
 
-    All running Snakemakes share a lock of ``running`` in Snakemake's `folder`; one that gets it exclusively is alone.
-    One that is not `main` was started for a job, and clears nothing. `temporary` are folders that it made elsewhere.
+    All running Snakemakes share a kernel lock of ``running`` in Snakemake's `folder`, which ends with them, unlike its
+    own locks; one that gets it exclusively is alone. One that is not `main` was started for a job, and clears nothing.
     """
-    own_folders, folder = [Path(path).absolute() for path in temporary], Path(folder)
     try:
         folder.mkdir(exist_ok=True)
         file = (folder / "running").open("a+", encoding="utf-8")
@@ -60,20 +55,11 @@ def clear_leftovers(temporary: Sequence[str | Path], main: bool = True, folder: 
         if main:
             with suppress(BlockingIOError):
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)  # this one is alone
-                file.seek(0)
-                leftovers = [path for pattern in LEFTOVERS for path in folder.glob(pattern)]
-                # Of the recorded folders, only siblings of the present ones, with names as tempfile makes them.
-                kinds = {(path.parent, path.name[:-8], len(path.name)) for path in own_folders}
-                recorded = map(Path, file.read().splitlines())
-                leftovers += [path for path in recorded if (path.parent, path.name[:-8], len(path.name)) in kinds]
-                for path in leftovers:
+                for path in (path for pattern in LEFTOVERS for path in folder.glob(pattern)):
                     if path.is_dir() and not path.is_symlink():
                         shutil.rmtree(path, ignore_errors=True)
                     else:
                         path.unlink(missing_ok=True)
-                file.truncate(0)
-            file.writelines(f"{path}\n" for path in own_folders)
-            file.flush()
         fcntl.flock(file, fcntl.LOCK_SH)
     except OSError:  # no locks on this file system
         file.close()

@@ -1,7 +1,4 @@
-"""Configs merged over each other: the suite's defaults, a user's files, and ``--config``; ``false`` leaves entries out.
-
-A merged config can add to mappings but take nothing away, hence the ``false``.
-"""
+"""Configs merged over each other; as a merged config takes nothing away, ``false`` leaves entries out."""
 
 from collections.abc import Callable, Collection, Iterable, Mapping
 from copy import deepcopy
@@ -71,37 +68,23 @@ def _merged(lower: Mapping[str, Any], upper: Mapping[str, Any]) -> dict[str, Any
 
 
 def in_order(config: Mapping[str, Any], lower: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Return a config with its keys in the order of another, by default the defaults; further keys follow.
-
-    Snakemake puts the keys of ``--configfile`` first, and the config's order is that of a table's rows.
-    """
+    """Return a config, whose order is that of rows, with the keys of the defaults, or another, first and in order."""
     lower = _defaults() if lower is None else lower
-    ordered: dict[str, Any] = {}
-    for key in (*(key for key in lower if key in config), *(key for key in config if key not in lower)):
-        value, below = config[key], lower.get(key)
-        both = isinstance(value, Mapping) and isinstance(below, Mapping)
-        ordered[key] = in_order(value, below) if both else value
+    ordered = {key: config[key] for key in (*lower, *config) if key in config}
+    for key, value in ordered.items():
+        if isinstance(value, Mapping) and isinstance(lower.get(key), Mapping):
+            ordered[key] = in_order(value, lower[key])
     return ordered
 
 
-def with_types(config: Mapping[str, Any], command_line: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the config with the command line's values, as far as it has them, read as in a config file.
-
-    Snakemake reads values inside lists and mappings as text.
-    """
-    return {
-        name: _typed(value, command_line[name]) if name in command_line else value for name, value in config.items()
-    }
-
-
-def _typed(value: Any, given: Any) -> Any:
-    """Return a value as in a config file where it is the one that the command line gives."""
+def with_types(value: Any, given: Any) -> Any:
+    """Return a config with the command line's values, which Snakemake reads as text, read as in a config file."""
     if isinstance(value, Mapping) and isinstance(given, Mapping):
-        return with_types(value, given)
+        return {name: with_types(part, given[name]) if name in given else part for name, part in value.items()}
     if value != given:
         return value
     if isinstance(value, list):
-        return [_typed(entry, entry) for entry in value]
+        return [with_types(entry, entry) for entry in value]
     return read_scalar(value) if isinstance(value, str) else value
 
 

@@ -31,7 +31,6 @@ NUMBERS = ("seed", "taught", "severity", "weight")  # columns
 FAMILIES = "families"  # the condition under which the guarantee holds
 VARIANTS = ("plain", "by_sample", "by_state", "by_family")
 PLAIN, BY_SAMPLE, BY_STATE, BY_FAMILY = VARIANTS
-WITH_SETS = (PLAIN, BY_SAMPLE, BY_STATE, BY_FAMILY)
 WITH_ALARM = (PLAIN, BY_SAMPLE, BY_FAMILY)
 SHIFTED = (BY_SAMPLE, BY_STATE)  # variants under shift
 COVERAGE, SIZE, SINGLE = ("coverage", "set_size", "single_state")
@@ -157,7 +156,7 @@ def answers_of(scored: Scored, condition: Condition, settings: GuaranteeSettings
             guarantees = {name: make() for name, make in made.items() if name in condition.variants}
             tested_n_5 = probabilities_N_5[tested_N]
             failure_n = 1 - tested_n_5[:, 0]
-            sets.append({name: each.sets(tested_n_5) for name, each in guarantees.items() if name in WITH_SETS})
+            sets.append({name: each.sets(tested_n_5) for name, each in guarantees.items()})
             calls.append({name: each.alarm(failure_n) for name, each in guarantees.items() if name in WITH_ALARM})
             if PLAIN in condition.variants:
                 sets[-1][PLAIN] = plain_sets(tested_n_5, settings.level)

@@ -52,11 +52,9 @@ class Guarantee:
             return None
         one, two = self.failure_alarm, other.failure_alarm
         limits = tuple(map(max, self.state_sets.limits, other.state_sets.limits))
-        bounds = {
-            "good_below": min(one.good_below, two.good_below),
-            "failed_from": max(one.failed_from, two.failed_from),
-        }
-        return replace(self, state_sets=replace(self.state_sets, limits=limits), failure_alarm=replace(one, **bounds))
+        failed_from = max(one.failed_from, two.failed_from)
+        alarm = replace(one, good_below=min(one.good_below, two.good_below), failed_from=failed_from)
+        return replace(self, state_sets=replace(self.state_sets, limits=limits), failure_alarm=alarm)
 
     def to_dict(self) -> dict[str, Any]:
         """Return numbers, words and lists, with None for infinite bounds."""
@@ -104,9 +102,8 @@ def calibrate(
     """
     state_N = np.asarray(state_N)
     if len(state_N) != len(scores_N_K) or (family_N is not None and len(family_N) != len(state_N)):
-        raise InputError(
-            "samples to calibrate on", "have other numbers of scores, states and families", "give one each"
-        )
+        fault = "have other numbers of scores, states and families"
+        raise InputError("samples to calibrate on", fault, "give one each")
     clear_N = state_N != BORDERLINE
     family_n = None if family_N is None else np.asarray(family_N)[clear_N]
     scores_n_K, state_n = np.asarray(scores_N_K, float)[clear_N], state_N[clear_N]

@@ -55,9 +55,7 @@ def load_arrays(
     try:
         with zipfile.ZipFile(path) as archive:
             members = _checked_members(archive, path, shapes, kinds, remedy)
-            arrays = {}
-            for name, info in members.items():
-                arrays[name] = _read(archive, info)
+            arrays = {name: _read(archive, info) for name, info in members.items()}
     except InputError:
         raise
     except Exception as fault:  # numpy and zipfile raise errors of many kinds for a damaged archive

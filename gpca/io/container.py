@@ -98,9 +98,8 @@ class Container:
         """Read the npz; `expected` is the source and seed that it names, or the container whose samples it holds."""
         samples, axes = (expected, expected.axes) if isinstance(expected, Container) else (None, expected)
         arrays = cls.read(path, axes)
-        loaded = cls(
-            **{name: arrays[name] for name in cls.array_fields()}, axes=axes_in(arrays) if "source" in arrays else axes
-        )
+        named = axes_in(arrays) if "source" in arrays else axes
+        loaded = cls(**{name: arrays[name] for name in cls.array_fields()}, axes=named)
         loaded.check(path)
         if samples is not None:
             require_same_samples(path, loaded.arrays, samples.arrays)

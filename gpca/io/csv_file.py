@@ -59,9 +59,8 @@ def read_csv(
             faults.append(("a split that is neither train nor test", ~entries.isin(SPLITS)))
         for fault_of_entry, at in faults:
             if at.any():
-                raise InputError(
-                    f"{path}, line {at.argmax() + 2}", f"column '{name}' contains {fault_of_entry}", remedy
-                )
+                line = f"{path}, line {at.argmax() + 2}"
+                raise InputError(line, f"column '{name}' contains {fault_of_entry}", remedy)
     return rows
 
 

@@ -85,15 +85,11 @@ def is_title(text: str) -> bool:
     return is_name(text) and len(text) <= LONGEST_TITLE
 
 
-def _in_words(axes: Axes) -> str:
-    source, seed = axes
-    return f"source '{source}'" + ("" if seed is None else f", seed {seed}")
-
-
 def require_axes(path: str | Path, actual: Axes, expected: Axes | None) -> None:
     if expected is not None and actual != expected:
-        wanted = _in_words(expected)
-        raise InputError(path, f"is of {_in_words(actual)}, not of {wanted}", f"give the file of {wanted}")
+        each = ((f"source '{source}'", f", seed {seed}" * (seed is not None)) for source, seed in (actual, expected))
+        found, wanted = map("".join, each)
+        raise InputError(path, f"is of {found}, not of {wanted}", f"give the file of {wanted}")
 
 
 @contextmanager
@@ -125,8 +121,9 @@ def _alone(partial: Path, folder: bool = False) -> Iterator[Path]:
         locked = os.open(partial, os.O_NOFOLLOW | (os.O_RDONLY if folder else os.O_RDWR | os.O_CREAT), 0o666)
         with suppress(OSError):  # a file system without locks
             fcntl.flock(locked, fcntl.LOCK_EX)
-        if _is_at(locked, partial):
-            break
+        with suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(locked), os.lstat(partial)):
+                break
         os.close(locked)  # the other writer has renamed it
     try:
         if folder:
@@ -140,13 +137,6 @@ def _alone(partial: Path, folder: bool = False) -> Iterator[Path]:
         raise
     finally:
         os.close(locked)
-
-
-def _is_at(descriptor: int, path: Path) -> bool:
-    try:
-        return os.path.samestat(os.fstat(descriptor), os.lstat(path))
-    except FileNotFoundError:
-        return False
 
 
 @contextmanager
@@ -218,9 +208,8 @@ def require_outputs(outputs: Iterable[str | Path], inputs: Iterable[str | Path] 
             raise InputError(output, f"cannot be written: {existing} is not a folder", "choose another name")
         # Permissions let root write to /proc, which fails.
         if not os.access(existing, os.W_OK | os.X_OK) or existing.is_relative_to("/proc"):
-            raise InputError(
-                output, f"cannot be written: no permission to write to {existing}", "choose another folder"
-            )
+            fault = f"cannot be written: no permission to write to {existing}"
+            raise InputError(output, fault, "choose another folder")
 
 
 def _real(path: str | Path) -> Path:

@@ -79,7 +79,7 @@ class LabeledRegistrations:
         result_N = np.array([diagnosis.result for diagnosis in self.diagnoses])
         scores_N_K, state_N = state_probabilities(causes_N_3, result_N), np.where(self._right_N, NOMINAL, self.label_N)
         states: tuple[str, ...] = STATES
-        if not self.named:
+        if not self._named:
             states = WHETHER_FAILED
             scores_N_K, state_N = whether_failed(scores_N_K), np.where(self._right_N, *WHETHER_FAILED)
         guarantee = calibrate(
@@ -106,12 +106,11 @@ class LabeledRegistrations:
         yield f"labeled   {right} right and {wrong} wrong{groups}, within {ends} % of the diameter{left_out}"
         yield self._promise("missed", f"at most {self.risk:.0%} of failures are called good", 1 - self.risk, WRONG)
         yield self._promise("alarms", f"at most {self.risk:.0%} of good ones are called failed", 1 - self.risk, RIGHT)
-        what = "the state" if self.named else "right or wrong, as not every wrong one has its cause"
+        what = "the state" if self._named else "right or wrong, as not every wrong one has its cause"
         yield self._promise("sets", f"{LEVEL:.0%} of the sets hold {what}", LEVEL, "")
 
     @property
-    def named(self) -> bool:
-        """Whether each wrong registration has its cause."""
+    def _named(self) -> bool:  # whether each wrong registration has its cause
         return not (self.label_N == WRONG).any()
 
     @property

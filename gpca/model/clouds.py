@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,13 +15,7 @@ from gpca.errors import InputError, refusing
 from gpca.io.files import require_file
 from gpca.numerals import decimal
 from gpca.objects import mesh_folder, point_files
-from gpca.objects.canonical import (
-    CanonicalFrame,
-    bounding_center,
-    canonical_cloud,
-    require_cloud_points,
-    thin,
-)
+from gpca.objects.canonical import CanonicalFrame, bounding_center, canonical_cloud, require_cloud_points, thin
 from gpca.objects.sizes import IN_PYTHON, extent, require_sizes
 from gpca.objects.surface import as_points, in_unit, measured
 from gpca.rigid import require_rigid, rigid_motion, transform
@@ -231,41 +225,32 @@ class Familiarity:
         below = {name for name, (low, _) in self.ranges.items() if measured[name] < low}
         above = {name for name, (_, high) in self.ranges.items() if measured[name] > high}
         between = " to ".join(f"{end:.2g}" for end in self.ranges["size"])
-        lines = {
-            f"the source is {measured['size']:.2g} times as large as the target; in training it was {between} times: "
-            "are both in the same unit and scale?": "size" in below | above,
-            "the target looks like a view from one side: give the whole object": "closure" in below,
-        }
-        gpca_lines = {
-            "the source shows the object from all sides; GP-CA was trained on partial views": "depth" in above,
-            "the source shows the object from one side alone; GP-CA was trained on clouds that show more": "depth"
-            in below,
-        }
-        any_pair, gpca_alone = ([line for line, holds in part.items() if holds] for part in (lines, gpca_lines))
+        any_pair, gpca_alone = [], []
+        if "size" in below | above:
+            times = f"{measured['size']:.2g} times as large as the target; in training it was {between} times"
+            any_pair.append(f"the source is {times}: are both in the same unit and scale?")
+        if "closure" in below:
+            any_pair.append("the target looks like a view from one side: give the whole object")
+        if "depth" in above:
+            gpca_alone.append("the source shows the object from all sides; GP-CA was trained on partial views")
+        if "depth" in below:
+            shown = "the source shows the object from one side alone"
+            gpca_alone.append(f"{shown}; GP-CA was trained on clouds that show more")
         return any_pair, gpca_alone
 
 
-class Void(NamedTuple):
-    """A fault of the pair, and what the user should check."""
-
-    fault: str
-    check: str
-
-    def __str__(self) -> str:
-        return f"{self.fault}, so the scores are meaningless: check {self.check}"
-
-
-def voids_of(source: np.ndarray, target: np.ndarray, fitness: float, familiar: Familiarity) -> list[Void]:
-    voids = []
+def voids_of(source: np.ndarray, target: np.ndarray, fitness: float, familiar: Familiarity) -> dict[str, str]:
+    """Return faults of the pair for which its scores mean nothing: a line -> what the user should check."""
+    check_of = {}
     if (matches := round(fitness * len(source))) < FEWEST_MATCHES:
         ended = f"only {matches} of the source's points" if matches else "no source point"
-        voids.append(Void(f"{ended} ended near the target", "the initial pose and the unit"))
+        check_of[f"{ended} ended near the target"] = "the initial pose and the unit"
     low, high = familiar.ranges["size"]
     if not low / FOREIGN <= relative_size(source, target) <= high * FOREIGN:
-        voids.append(Void("source and target differ in scale", "the unit and scale of both"))
+        check_of["source and target differ in scale"] = "the unit and scale of both"
     # Twice the radius about the median that contains the share `BULK` of the points.
     bulk = 2 * float(np.quantile(np.linalg.norm(target - np.median(target, axis=0), axis=1), BULK))
     if bulk < SMALLEST_BULK:
         span = f"{BULK:.0%} of the target's points span {bulk:.2g} of its diameter"
-        voids.append(Void(span, "the target for points far from the object"))
-    return voids
+        check_of[span] = "the target for points far from the object"
+    return {f"{fault}, so the scores are meaningless: check {check}": check for fault, check in check_of.items()}

@@ -21,15 +21,7 @@ from gpca.explainers.pair_classifier import Judgment, PairClassifier
 from gpca.guarantee.guarantee import SEVERAL, Guarantee, calibrate
 from gpca.io.container import Container, array
 from gpca.model.diagnosis import Diagnosis, Guaranteed, Reenacted, state_probabilities
-from gpca.model.result import (
-    DEFAULT_TOLERANCE,
-    TOLERANCES,
-    UNCALIBRATED,
-    Calibrated,
-    Evidence,
-    ResultJudge,
-    calibrated_at,
-)
+from gpca.model.result import DEFAULT_TOLERANCE, TOLERANCES, UNCALIBRATED, Calibrated, Evidence, ResultJudge, level_at
 from gpca.pairs.distances import ObservedPair
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reenactment.dataset import DESCRIPTORS, Reenactments, reenactment_features, row_of
@@ -47,14 +39,8 @@ FOLDS = 3  # of the families
 LEVEL = 0.9  # probability that a set of states contains the true one
 MISSED = 0.05  # largest probability that a failure is called good
 ENDS = ("_low", "_high")  # of the interval of a measure
-
-
 # Method of a registration -> the ICP that runs it again.
-RUN_AGAIN: Mapping[str, Method] = {
-    "point_to_plane": "point_to_plane",
-    "gicp": "generalized",
-    "gicp_small": "generalized",
-}
+RUN_AGAIN: dict[str, Method] = {"point_to_plane": "point_to_plane", "gicp": "generalized", "gicp_small": "generalized"}
 
 
 @dataclass(frozen=True)
@@ -91,7 +77,7 @@ class Diagnoser:
     @property
     def at_default(self) -> Calibrated:
         """What holds of results at the default tolerance."""
-        return calibrated_at(self.levels, DEFAULT_TOLERANCE)
+        return level_at(self.levels, DEFAULT_TOLERANCE)
 
     def diagnose(
         self,
@@ -107,7 +93,7 @@ class Diagnoser:
         inputs_1_F = self.classifier.normalized(features_F[None])
         judged = self.classifier.judge(inputs_1_F)
         result_1 = self.judge.probability(evidence, tolerance, described_1_F)
-        level = calibrated_at(self.levels, tolerance)
+        level = level_at(self.levels, tolerance)
         scores_1_5, guarantee = state_probabilities(judged.causes_N_3, result_1), level.guarantee
         diagnosis = Diagnosis(
             result=float(result_1[0]),
@@ -274,17 +260,16 @@ def learn(
     judged, result_T_N = judged_unseen(training, gpc, *axes)
     clear_N, nominal_N = training.label_N != BORDERLINE, training.label_N == NOMINAL
     start_threshold = threshold_of(judged.failure_N[nominal_N], false_alarms)
-    calibrated_levels = (
+    levels = [
         calibrated(training, judged, result_N, tolerance, false_alarms)
         for tolerance, result_N in zip(TOLERANCES, result_T_N, strict=True)
         if (training.shown_error_N <= tolerance).any()
-    )
-    levels = tuple(calibrated_levels) or UNCALIBRATED
+    ]
     diagnoser = Diagnoser(
         classifier=training.subset(clear_N).classifier(gpc, *axes),
         start_threshold=start_threshold,
         judge=training.judge(),
-        levels=levels,
+        levels=tuple(levels) or UNCALIBRATED,
         points=min(causes.points[1], MOST_REENACTED),
         runs=causes.runs(),
         moved=causes.moved,

@@ -233,10 +233,6 @@ class Reenacted:
         first = self.poses[0]
         return None if first.registered or first.probability < SURE else first
 
-    def as_dict(self) -> dict[str, object]:
-        """Values for JSON."""
-        return asdict(self, dict_factory=plain)
-
     def words(self, subject: str, unit: str) -> list[str]:
         """Describe each hypothesis relative to the result, such as ``the object also fits moved by 20 mm``."""
         verbs = ["fits", *["also fits"] * (len(self.poses) - 1)]

@@ -70,17 +70,13 @@ class Explainer:
         source_unit: str | None = None,
         repair: bool = False,
     ) -> Explanation:
-        """Register the source to the target and explain the result. The same clouds give the same numbers.
+        """Register a cloud (N, 3) to another, explain the result and, with `repair`, put it right (:meth:`repair`).
 
-        Args:
-            source_points, target_points: (N, 3) arrays or Open3D clouds, in the `unit` of poses and results, too.
-            frame: canonical frame of the target; by default, computed from its points.
-            uncertainty: spread of the starts for the uncertainty of the pose; None skips it.
-            method, estimator: of docs/registration.md; by default, the model's own ICP, and Monte-Carlo.
-            tolerance: how far the pose may be off: a length, an angle or a share of the diameter, such as ``5mm``.
-            register: whether to register; otherwise the initial pose itself is explained, as :meth:`judge` does.
-            fast: whether to re-enact fewer points and poses, without a guarantee.
-            repair: whether to put a wrong result right, see :meth:`repair`.
+        Clouds may be Open3D's. They, poses and results are in the `unit`; `frame` is the target's canonical one, if
+        known. Methods and estimators are those of docs/registration.md; without `uncertainty`, the spread of starts,
+        the uncertainty of the pose is not estimated. A `tolerance` is a length, an angle or a share of the diameter,
+        such as ``5mm``. `fast` re-enacts fewer points and poses, without a guarantee. The same clouds give the same
+        numbers.
         """
         began, seconds, notes = perf_counter(), dict[str, float](), list[str]()
         inputs = (source_points, target_points, T_target_source_init, unit, frame)
@@ -102,14 +98,14 @@ class Explainer:
             raise InputError("model", "gives non-finite numbers for these clouds", "use another one")
         with _timed(seconds, "familiarity"):
             unusual, unusual_to_gpca = self.model.familiar.warnings(clouds.source, clouds.target)
-            warnings = [*map(str, voids), *unusual]
+            warnings = [*voids, *unusual]
             if voids and (scale := diagnosis.reenacted.scale) and scale.off:
                 warnings.append(scale.words)
             if diagnosis.unlikeness > 1:
-                warnings.append(
-                    f"the pair is {diagnosis.unlikeness:.1f} times as far from the registrations that the diagnosis "
-                    "was trained on as 99 % of these are from one another"
+                far = (
+                    f"{diagnosis.unlikeness:.1f} times as far from the registrations that the diagnosis was trained on"
                 )
+                warnings.append(f"the pair is {far} as 99 % of these are from one another")
             if started and method is None and self._fits_inverted(clouds, outcome):
                 warnings.append("the inverse of the initial pose fits far better: is it T_source_target?")
         moved = Motion.of(T_found, clouds.source, clouds.frame.diameter) if started else None
@@ -125,7 +121,7 @@ class Explainer:
         if repaired is not None and repaired.verdict == REPAIRED and not diagnosis.wrong_scale:
             decision = Decision(TAKE, "", repaired.reason)
         elif voids:
-            decision = Decision(CHECK, "", ", ".join(void.check for void in voids))
+            decision = Decision(CHECK, "", ", ".join(voids.values()))
         elif diagnosis.state == NOMINAL:
             decision = Decision(NOTHING, "", diagnosis.remark)
         else:
@@ -215,14 +211,11 @@ class Explainer:
 
     def embed(self, aligned: np.ndarray) -> np.ndarray:
         """Return the mean embedding (1, d) of random draws of an aligned source cloud (N, 3) in the canonical frame."""
-        settings = self.model.encoder.settings
-        n = settings.draw_points
-        draws = 1 if len(aligned) == n else settings.draws
-        rows_D_N = [
-            generator("explanation", "draw", draw).choice(len(aligned), n, replace=len(aligned) < n, shuffle=False)
-            for draw in range(draws)
-        ]
-        h_D_d = self.model.encoder(aligned.astype(np.float32)[np.array(rows_D_N)], self._device)
+        count, n = len(aligned), self.model.encoder.settings.draw_points
+        draws = [generator("explanation", "draw", draw) for draw in range(self.model.encoder.settings.draws)]
+        few = draws[:1] if count == n else draws
+        rows_D_N = np.array([random.choice(count, n, replace=count < n, shuffle=False) for random in few])
+        h_D_d = self.model.encoder(aligned.astype(np.float32)[rows_D_N], self._device)
         return h_D_d.mean(axis=0, keepdims=True)
 
     def _decided(self, diagnosis: Diagnosis, registered: bool) -> Decision:

@@ -123,12 +123,10 @@ class ExplainedRegistration:
     @property
     def fitting_pose(self) -> np.ndarray:
         """T_target_source (4, 4) of the pose that fits best: the result, unless another pose is more probable."""
-        poses = self.reenacted_poses
+        poses = self._poses()
         return self.T_target_source if not poses or poses[0].registered else poses[0].T_target_source
 
-    @property
-    def reenacted_poses(self) -> Sequence[FittingPose]:
-        """Hypotheses of the true pose, most probable first; none without a re-enactment."""
+    def _poses(self) -> Sequence[FittingPose]:  # of a re-enactment, most probable first
         return ()
 
     def save_pose(self, path: str | Path) -> None:
@@ -157,6 +155,8 @@ class ExplainedRegistration:
         if self.fitting_pose is not self.T_target_source:
             name = "the repaired pose" if self.action == TAKE else "pose 1"
             pose += ["", f"{name} as T_target_source, which --save-pose writes", *self.pose_rows(self.fitting_pose)]
+        if self.spread is not None:
+            registration += f"\n{self.spread.line(self.unit)}"
         if self.moved:
             distance = page.length(self.moved.distance, self.unit)
             registration += f"\nmoved          {self.moved.rotation_deg:.3g}° and {distance} from the initial pose"
@@ -176,9 +176,7 @@ class Explanation(ExplainedRegistration):
     concept: str  # concept with the largest score (Eq. 6).
     seconds: dict[str, float]  # duration of each stage, and ``total``
 
-    @property
-    def reenacted_poses(self) -> Sequence[FittingPose]:
-        """Hypotheses of the true pose, most probable first; none where they mean nothing."""
+    def _poses(self) -> Sequence[FittingPose]:
         return () if self.unknown else self.diagnosis.reenacted.poses
 
     @property
@@ -241,11 +239,9 @@ class Explanation(ExplainedRegistration):
 
     def text(self) -> str:
         """Return a report for a reader."""
-        lines = [f"fitness {self.fitness:.3f}, inlier RMSE {in_decimals(self.inlier_rmse, 4)} {self.unit}"]
-        if self.spread is not None:
-            lines.append(self.spread.line(self.unit))
+        fit = f"fitness {self.fitness:.3f}, inlier RMSE {in_decimals(self.inlier_rmse, 4)} {self.unit}"
         stages = ", ".join(f"{stage} {1e3 * seconds:.1f}" for stage, seconds in self.seconds.items())
-        return self._report(self.lines(), "\n".join(lines), "", f"milliseconds   {stages}")
+        return self._report(self.lines(), fit, "", f"milliseconds   {stages}")
 
 
 @dataclass(frozen=True)
@@ -272,9 +268,7 @@ class ScanExplanation(ExplainedRegistration):
     seconds: float  # duration
     learned_from: str = LEARNED  # training data: none
 
-    @property
-    def reenacted_poses(self) -> Sequence[FittingPose]:
-        """Hypotheses of the true pose, most probable first."""
+    def _poses(self) -> Sequence[FittingPose]:
         return self.reenacted.poses
 
     def lines(self) -> list[str]:
@@ -294,10 +288,7 @@ class ScanExplanation(ExplainedRegistration):
     def text(self) -> str:
         """Return a report for a reader."""
         rmse, voxel = (page.length(value, self.unit) for value in (self.inlier_rmse, self.voxel))
-        lines = [f"fitness {self.fitness:.3f}, inlier RMSE {rmse}, voxels of {voxel}"]
-        if self.spread is not None:
-            lines.append(self.spread.line(self.unit))
-        return self._report(self.lines(), "\n".join(lines))
+        return self._report(self.lines(), f"fitness {self.fitness:.3f}, inlier RMSE {rmse}, voxels of {voxel}")
 
     def html(self, names: Mapping[str, str] | None = None) -> str:
         """Return a page that needs no other file, as :meth:`Explanation.html` does."""

@@ -19,6 +19,7 @@ BRIGHTEST = 0.8  # of viridis; what is brighter is lost on white
 OUTSIDE = 0.01  # share of the points after the registration that the panels may leave out
 LETTERS = 46  # in a line of text
 MOST_LINES = 12
+Views = list[tuple[str, np.ndarray]]  # title, cloud
 ROWS = [subset for subset in BY_SIZE if len(SUBSETS[subset]) in (0, 2, 3)]  # all causes, one of them gone, none
 
 
@@ -36,7 +37,7 @@ def draw_explanation(explanation: Explanation, png_path: str | Path, names: str 
     above_in = BAR_IN + VIEW_IN * min(high / wide, 1.2)
     figure = style.use_style().figure(figsize=(style.TEXT_WIDTH_IN, above_in + BELOW_IN), layout="constrained")
     above, below = figure.subfigures(2, 1, height_ratios=(above_in, BELOW_IN))
-    _draw_views(above, explanation, scene, views, view, corners_2_2)
+    _draw_views(above, explanation.unit, scene, views, view, corners_2_2)
     left, middle, right = below.subplots(1, 3, width_ratios=(1, 1, 1.3))
     _draw_causes(left, explanation)
     _draw_what_ifs(middle, scene, explanation.unit)
@@ -49,7 +50,7 @@ def draw_explanation(explanation: Explanation, png_path: str | Path, names: str 
     style.save_png(figure, png_path, dpi=200)
 
 
-def _views(explanation: Explanation, scene: Scene) -> list[tuple[str, np.ndarray]]:
+def _views(explanation: Explanation, scene: Scene) -> Views:
     views = [("before", scene.source), ("after", scene.aligned)]
     if scene.T_repaired is not None:
         return [*views, ("repaired", transform(scene.T_repaired, scene.source))]
@@ -60,14 +61,7 @@ def _views(explanation: Explanation, scene: Scene) -> list[tuple[str, np.ndarray
     return views
 
 
-def _draw_views(
-    figure,
-    explanation: Explanation,
-    scene: Scene,
-    views: list[tuple[str, np.ndarray]],
-    view: np.ndarray,
-    corners_2_2: np.ndarray,
-) -> None:
+def _draw_views(figure, unit: str, scene: Scene, views: Views, view: np.ndarray, corners_2_2: np.ndarray) -> None:
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
     from scipy.spatial import cKDTree
@@ -86,7 +80,7 @@ def _draw_views(
         panel.set(aspect="equal", xlim=corners_2_2[0], ylim=corners_2_2[1])
         panel.set_axis_off()
         panel.set_title(title)
-    label = f"distance to the target ({explanation.unit})"
+    label = f"distance to the target ({unit})"
     bar = figure.colorbar(shown, ax=panels, location="bottom", shrink=0.5, aspect=50, extend="max", label=label)
     bar.outline.set_linewidth(0.4)
 
@@ -112,13 +106,11 @@ def _draw_what_ifs(panel, scene: Scene, unit: str) -> None:
 
 
 def _lines(explanation: Explanation) -> list[str]:
-    diagnosis = explanation.diagnosis
-    if explanation.unknown:
-        lines = ["state: unknown"]
-    else:
-        lines = [f"{diagnosis.state}: {diagnosis.statement}"]
+    diagnosis, lines = explanation.diagnosis, ["state: unknown"]
+    if not explanation.unknown:
         tolerance = f"{in_decimals(diagnosis.tolerance)} {explanation.unit}"
-        lines.append(f"off by more than {tolerance} with probability {diagnosis.result:.2f}")
+        off = f"off by more than {tolerance} with probability {diagnosis.result:.2f}"
+        lines = [f"{diagnosis.state}: {diagnosis.statement}", off]
         lines += [" ".join(line.split()) for line in (diagnosis.guarantee.lines() if diagnosis.guarantee else [])]
     lines.append(f"action: {explanation.advice} ({explanation.reason})")
     return lines + [f"warning: {warning}" for warning in explanation.warnings]

@@ -109,11 +109,9 @@ class Model:
             raise InputError(path, f"is damaged or not a model{why}", REMEDY) from fault
         if not isinstance(content, Mapping) or content.get("format") != FORMAT:
             raise InputError(path, "is not a model", REMEDY)
-        if (version := content.get("version")) not in (VERSION, VERSION - 1, torch_file.VERSION):
+        if (version := content.get("version")) not in (VERSION, VERSION - 1):
             raise InputError(path, f"is a model of version {version}, not {VERSION}", REMEDY)
         try:
-            if version == torch_file.VERSION:
-                content = torch_file.upgraded(content)
             if version != VERSION:
                 content = {**content, "diagnoser": upgraded(content["diagnoser"])}
             encoder_settings = dict(content["encoder_settings"])
@@ -254,12 +252,9 @@ def _require_classifier(state: Mapping, classes: tuple[str, ...], d: int) -> Non
     _require((state["scaler_scale"] > 0).all(), "'scaler_scale' contains values that are not above 0")
     covariance = state["covariance"].astype(np.float64)
     # Cholesky reads one triangle alone.
-    symmetric = not covariance.size or np.abs(covariance - np.swapaxes(covariance, 1, 2)).max() <= ASYMMETRY
-    try:
-        positive = bool(symmetric) and np.linalg.cholesky(covariance) is not None
-    except np.linalg.LinAlgError:
-        positive = False
-    _require(positive, "'covariance' is not symmetric and positive definite")
+    asymmetry = np.abs(covariance - np.swapaxes(covariance, 1, 2)).max(initial=0)
+    _require(asymmetry <= ASYMMETRY, "'covariance' is not symmetric")
+    np.linalg.cholesky(covariance)  # LinAlgError, a ValueError, unless they are positive definite
     targets = state["targets"]
     possible = targets.dtype.kind == "i" and ((targets >= 0) & (targets < n_classes)).all()
     _require(possible, "'targets' names a missing concept")

@@ -89,9 +89,7 @@ def propose(
 class TruePoses:
     """Hypotheses that may be true, and an estimate by another criterion, as refined poses agree with theirs."""
 
-    whole: (
-        ModelSurface  # by which errors are measured: as what was observed under the likeliest hypothesis completes it
-    )
+    whole: ModelSurface  # measures errors: completed by what was observed under the likeliest hypothesis
     T_k: np.ndarray  # (k, 4, 4)
     weight_k: np.ndarray  # probabilities
 

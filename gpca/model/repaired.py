@@ -19,7 +19,7 @@ from gpca.model.diagnosis import CHECK, TAKE, UNKNOWN, FittingPose, outside
 from gpca.model.explanation import GIVEN, UNKNOWN_STATUS, ExplainedRegistration, PoseSpread
 from gpca.model.file import Model
 from gpca.model.repair import GOOD, NOT_REPAIRED, REPAIRED, SEVERAL, Part, Proposals, Verdict
-from gpca.model.result import calibrated_at
+from gpca.model.result import level_at
 from gpca.model.scene import Scene
 from gpca.model.undetermined import Undetermined, undetermined_at
 from gpca.numerals import in_decimals
@@ -68,7 +68,9 @@ class OtherPose(FittingPose):
 class Repair(ExplainedRegistration):
     """What became of one registration; `T_target_source` is the registered pose, unless it was repaired."""
 
-    verdict: str  # ``good``, ``repaired``, ``not repaired``, ``several poses fit`` or ``unknown``
+    verdict: str = UNKNOWN  # or ``good``, ``repaired``, ``not repaired``, ``several poses fit``
+    action: str = CHECK
+    reason: str = ""
     T_registered: np.ndarray  # (4, 4)
     tolerance: float  # in the unit of the points
     tolerance_share: float  # in diameters of the target
@@ -110,13 +112,11 @@ class Repair(ExplainedRegistration):
             fitness=outcome.fitness,
             inlier_rmse=outcome.inlier_rmse * frame.diameter,
             method=method or model.icp.method,
-            verdict=UNKNOWN,
-            action=CHECK,
-            reason="check " + ", ".join(void.check for void in voids),
+            reason="check " + ", ".join(voids.values()),
             unit=unit,
             tolerance=limit,
             tolerance_share=tolerance,
-            warnings=(*map(str, voids), *((LOST,) if lost else ()), *unusual),
+            warnings=(*voids, *((LOST,) if lost else ()), *unusual),
             learned_from=model.learning,
             scene=scene,
         )
@@ -140,7 +140,7 @@ class Repair(ExplainedRegistration):
             hypotheses = repair.search(pair, diagnoser.reenactment, surface)
         proposals = repair.propose(clouds.source, surface, T, *hypotheses, refine, measure)
         proposals.evidence.fitness_N[0], proposals.evidence.inlier_rmse_N[0] = pair.fitness_n[0], pair.inlier_rmse_n[0]
-        level = calibrated_at(diagnoser.levels, tolerance)
+        level = level_at(diagnoser.levels, tolerance)
         described_F = None if method == GIVEN else described(pair, diagnoser.runs.icp)
         verdict = repair.decide(diagnoser.judge, level, proposals, tolerance, lost, described_F)
         errors_n = diagnoser.judge.error(proposals.evidence)
@@ -150,8 +150,13 @@ class Repair(ExplainedRegistration):
             outliers, missing = repair.unseen(clouds.source, surface, T_best)
             free = undetermined_at(transform(T_best, before), surface)
             spread = PoseSpread(free.covariance, frame.diameter, SURFACE, None)
-            parts: dict[str, Any] = {"free": free.outside(frame), "spread": spread}
-            unrepaired = replace(unrepaired, outliers=outliers, missing=missing, **parts)
+            more: dict[str, Any] = {
+                "outliers": outliers,
+                "missing": missing,
+                "free": free.outside(frame),
+                "spread": spread,
+            }
+            unrepaired = replace(unrepaired, **more)
         if verdict.row:
             _, (fitness,), (rmse,) = clouds.icp.register(clouds.source, T_best[None], max_iterations=0)
             unrepaired = replace(unrepaired, fitness=float(fitness), inlier_rmse=float(rmse) * frame.diameter)
@@ -185,13 +190,8 @@ class Repair(ExplainedRegistration):
         )
 
     @property
-    def settled(self) -> bool:
-        """Whether `T_target_source` is a pose to use."""
-        return self.verdict in (GOOD, REPAIRED)
-
-    @property
     def status(self) -> int:
-        """The exit code of the command."""
+        """The exit code of the command: 0 if `T_target_source` is a pose to use."""
         return STATUSES[self.verdict]
 
     def lines(self) -> list[str]:
@@ -217,14 +217,14 @@ class Repair(ExplainedRegistration):
             rotation, shift = in_decimals(self.spread.rotation_deg), in_decimals(self.spread.translation)
             lines.append(f"spread    {rotation}° and {shift} {self.unit}, root mean square")
             lines += self.free.lines(self.unit) if self.free else []
-        if not self.settled:
+        if self.status:
             lines += [pose.line(number, self.unit) for number, pose in enumerate(self.poses, 1)]
         return lines
 
     def text(self) -> str:
         """Return a report for a reader, of few lines."""
         warnings = [f"warning   {line}" for line in self.warnings]
-        head = f"T_target_source, in {self.unit}" + ("" if self.settled else ", as registered")
+        head = f"T_target_source, in {self.unit}" + (", as registered" if self.status else "")
         return "\n".join([*warnings, *self.lines(), "", head, *self.pose_rows(self.T_target_source), ""])
 
     def html(self, names: Mapping[str, str] | None = None) -> str:

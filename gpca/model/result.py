@@ -203,7 +203,7 @@ class Calibrated:
 UNCALIBRATED = (Calibrated(DEFAULT_TOLERANCE, EVEN),)
 
 
-def calibrated_at(levels: Sequence[Calibrated], tolerance: float) -> Calibrated:
+def level_at(levels: Sequence[Calibrated], tolerance: float) -> Calibrated:
     """Return what holds at a tolerance: between two levels the more cautious of both, beyond them no guarantee."""
     by = attrgetter("tolerance")
     lower = max((level for level in levels if level.tolerance <= tolerance * ROUNDED), default=None, key=by)

@@ -17,7 +17,7 @@ from gpca.alignment.pose_error import displacements
 from gpca.causes.policy import NOTHING, TREATMENTS
 from gpca.causes.truth import FAILED, NOMINAL
 from gpca.errors import InputError
-from gpca.model.diagnosis import CHECK, RERUN, RESCALE, UNKNOWN, Reenacted, outside
+from gpca.model.diagnosis import CHECK, RERUN, RESCALE, Reenacted, outside
 from gpca.model.explanation import GIVEN, LEARNED, NOT_SURE, Evidence, Motion, PoseSpread, ScanExplanation
 from gpca.model.repair import verdict_of
 from gpca.model.repaired import OtherPose, Repair
@@ -60,13 +60,10 @@ def explain_scans(
 ) -> ScanExplanation:
     """Register a scan to a scan, and judge whether that may have failed. The same clouds give the same numbers.
 
-    Args:
-        source_points, target_points: (N, 3) arrays, or Open3D clouds, in the `unit` of poses, voxel and limit, too.
-        voxel: edge length of the voxels to which both are thinned; by default, chosen from the point spacing.
-        method, estimator: of docs/registration.md; by default, ICP, and none.
-        limit: error above which the result is wrong, root mean square over the common surface; by default, 0.2 m or
-            two voxels, whichever is more, but at most 5 % of the target's extent.
-        T_target_source: (4, 4) pose to be judged; nothing is registered then. It is the initial pose, too, by default.
+    Both, arrays (N, 3) or Open3D clouds, are thinned to voxels of this edge, by default by the point spacing. Methods
+    and estimators are those of docs/registration.md. A result is wrong if its error, root mean square over the common
+    surface, is above the limit: by default, 0.2 m or two voxels, but at most 5 % of the target's extent. If
+    `T_target_source` is given, it is judged, and nothing is registered.
     """
     started = perf_counter()
     given = source_points, target_points, T_target_source_init, unit, voxel, method, source_unit, limit, T_target_source
@@ -80,11 +77,18 @@ def explain_scans(
     state = state_of(failure, overlap[0])
     if scans.fills_volume and state == NOMINAL:
         state = NOT_SURE
-    causes = () if state == NOMINAL else causes_of(reenacted, limit)
+    effects, causes = reenacted.effects, tuple[str, ...]()
+    if state != NOMINAL:
+        causes = tuple(
+            name for name in sorted(effects, key=lambda name: -effects[name]) if effects[name] >= ADDS * limit
+        )
     action, reason = decision(state, reenacted, overlap[0], causes)
     if (scale := reenacted.scale) and scale.off and scale.error > limit:
         state, causes, action, reason = FAILED, ("scale",), RESCALE, scale.advice
-    warning = f"only {overlap[0]:.0%} of the source lies on the target: wrong poses may fit as well as the right one"
+    warnings = [VOLUME] if scans.fills_volume else []
+    if overlap[0] < LEAST_OVERLAP:
+        share = f"only {overlap[0]:.0%} of the source lies on the target"
+        warnings.insert(0, f"{share}: wrong poses may fit as well as the right one")
     moved, spread = None, None
     if T_target_source is None and T_target_source_init is not None:
         moved = Motion.of(T_found, scans.source, frame.diameter)
@@ -115,9 +119,7 @@ def explain_scans(
         unit=unit,
         seconds=perf_counter() - started,
         notes=tuple(notes),
-        warnings=tuple(
-            words for words, given in ((warning, overlap[0] < LEAST_OVERLAP), (VOLUME, scans.fills_volume)) if given
-        ),
+        warnings=tuple(warnings),
         scene=Scene(
             *(scans.source, scans.target, T_found, frame, SHOWN_REACH * scans.voxel, tolerance),
             enactments=enactments,
@@ -163,9 +165,6 @@ def repair_scans(
         fitness=at_pose.fitness,
         inlier_rmse=at_pose.inlier_rmse * frame.diameter,
         method=method,
-        verdict=UNKNOWN,
-        action=CHECK,
-        reason="",
         unit=unit,
         tolerance=limit,
         tolerance_share=tolerance,
@@ -208,8 +207,8 @@ def registered_scans(
         outcome = scans.registered() if method is None else scans.registered_by(method)
     if outcome.failure:
         notes.append(f"{method} failed: {outcome.failure}")
-    name = GIVEN if T_given is not None else method or scans.icp_name
-    return scans, frame, T_init, outcome, name, limit, notes
+    icp = f"{'point_to_point' if scans.flat else 'point_to_plane'}, coarse to fine or fine"
+    return scans, frame, T_init, outcome, GIVEN if T_given is not None else method or icp, limit, notes
 
 
 def _reenacted(scans: Scans, enactments: Sequence[Enactment], T_found: np.ndarray) -> Reenacted:
@@ -279,11 +278,6 @@ def state_of(failure: float, overlap: float) -> str:
     if 0 < overlap < LEAST_OVERLAP:
         return NOT_SURE
     return FAILED if failure >= BAD else NOMINAL if failure < GOOD else NOT_SURE
-
-
-def causes_of(reenacted: Reenacted, limit: float) -> tuple[str, ...]:
-    ranked = sorted(reenacted.effects, key=lambda name: -reenacted.effects[name])
-    return tuple(name for name in ranked if reenacted.effects[name] >= ADDS * limit)
 
 
 def decision(state: str, reenacted: Reenacted, overlap: float, causes: Sequence[str]) -> tuple[str, str]:

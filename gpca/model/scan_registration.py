@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from gpca.alignment.batched_icp import AnyICP, BatchedICP, BatchedPlaneICP
 from gpca.alignment.features import NEIGHBORS, estimate_normals
-from gpca.alignment.icp import ICPSettings, clipped_cost
+from gpca.alignment.icp import ICPSettings, Method, clipped_cost
 from gpca.alignment.methods.interface import Outcome, Pair
 from gpca.alignment.methods.registry import make_method
 from gpca.alignment.pose_error import displacements
@@ -102,13 +102,12 @@ class VoxelICP:
 
     def __init__(self, target: np.ndarray, normals: np.ndarray | None, voxel: float) -> None:
         self._reach = COARSE_TO_FINE[-1] * voxel
-        self._levels: list[AnyICP] = []
-        for far in COARSE_TO_FINE:
-            if normals is None:
-                self._levels.append(BatchedICP(target, ICPSettings("point_to_point", far * voxel, ITERATIONS)))
-            else:
-                settings = ICPSettings("point_to_plane", far * voxel, ITERATIONS)
-                self._levels.append(BatchedPlaneICP(target, normals, settings))
+        method: Method = "point_to_point" if normals is None else "point_to_plane"
+        levels = [ICPSettings(method, far * voxel, ITERATIONS) for far in COARSE_TO_FINE]
+        self._levels: list[AnyICP] = [
+            BatchedICP(target, level) if normals is None else BatchedPlaneICP(target, normals, level)
+            for level in levels
+        ]
 
     def register(self, source: np.ndarray, T_n: np.ndarray) -> tuple[np.ndarray, ...]:
         """Align points (N, 3) from poses (n, 4, 4), as :meth:`BatchedICP.register`."""
@@ -189,18 +188,15 @@ class Scans:
 
     def overlap(self, T: np.ndarray) -> tuple[float, float]:
         """Share of the source that lies on the target at a pose, and of the target that lies on the source."""
-        moved, reach = transform(T, self.source), PARTNER * self.voxel
-        source_share = np.isfinite(self._tree.query(moved, distance_upper_bound=reach)[0]).mean()
-        target_share = np.isfinite(cKDTree(moved).query(self.target, distance_upper_bound=reach)[0]).mean()
-        return float(source_share), float(target_share)
+        moved = transform(T, self.source)
+        return float(self._near(moved).mean()), float(self._near(self.target, cKDTree(moved)).mean())
 
     def estimated(self, estimator: str, outcome: Outcome, method: str) -> CovarianceEstimate:
         """Estimate the covariance of a result of a method, in radians and extents."""
-        settings = UncertaintySettings()
-        options = {"starts": settings.starts} if estimator == MONTE_CARLO else {}
-        unit, pair = METHOD_UNIT * self.voxel, self._in_voxels(seed_of("scans", "estimate"))
+        settings, unit = UncertaintySettings(), METHOD_UNIT * self.voxel
+        estimate = make_estimator(estimator, {"starts": settings.starts} if estimator == MONTE_CARLO else {})
         scaled = replace(outcome, T_target_source=scale_translation(outcome.T_target_source, 1 / unit))
-        estimate = make_estimator(estimator, options)
+        pair = self._in_voxels(seed_of("scans", "estimate"))
         estimated = estimate(RegisteredPair(pair, scaled, method, settings.deviation_6()))
         if estimated.covariance_6_6 is None:
             return estimated
@@ -212,16 +208,14 @@ class Scans:
         source_normals, target_normals = self._normals
         return Pair(self.source / unit, self.target / unit, np.eye(4), source_normals, target_normals, seed)
 
-    @property
-    def icp_name(self) -> str:
-        """Name of the method of :meth:`registered`."""
-        return f"{'point_to_point' if self.flat else 'point_to_plane'}, coarse to fine or fine"
-
     def common(self, T: np.ndarray) -> np.ndarray:
         """Return the points (n, 3) of the source that lie on the target at a pose, or all if hardly any does."""
         moved = transform(T, self.source)
-        near_N = np.isfinite(self._tree.query(moved, distance_upper_bound=PARTNER * self.voxel)[0])
+        near_N = self._near(moved)
         return moved[near_N] if near_N.sum() >= FEWEST_POINTS else moved
+
+    def _near(self, points: np.ndarray, tree: cKDTree | None = None) -> np.ndarray:
+        return np.isfinite((tree or self._tree).query(points, distance_upper_bound=PARTNER * self.voxel)[0])
 
     def poses(self, T_found: np.ndarray, same: float) -> list[PossiblePose]:
         """Return poses that may be true, refined, the best first and none within `same`; the result is among them."""
@@ -255,7 +249,7 @@ class Scans:
         """Register again with each subset of the causes, as if a pose were true; all of them gave the result."""
         T, few = pose.T, _drawn(self.source, RUN_POINTS, "runs")
         hypothesis = Hypothesis(T, np.ones(len(few)), 0.0, self.voxel, 1.0, pose.log_posterior, np.zeros(len(few)))
-        scans = vars(cropped(hypothesis, few, self._surface, self._noise_scale))
+        scans = vars(cropped(hypothesis, few, *self._whole))
         candidate = VoxelCandidate(**scans, normals=self._normals[1], voxel=self.voxel)
         errors = OverlapErrors(candidate.clean[candidate.seen], 1.0)
         registrar, nothing = Registrar(candidate, TRUTH, misses=True), np.zeros((1, 6))
@@ -299,12 +293,9 @@ class Scans:
         return VoxelICP(self.target, self._normals[1], self.voxel)
 
     @cached_property
-    def _surface(self) -> ModelSurface:
-        return ModelSurface(self.target)
-
-    @cached_property
-    def _noise_scale(self) -> NoiseScale:
-        return NoiseScale(self._surface, generator("scans", "noise"))
+    def _whole(self) -> tuple[ModelSurface, NoiseScale]:
+        surface = ModelSurface(self.target)
+        return surface, NoiseScale(surface, generator("scans", "noise"))
 
     @cached_property
     def _tree(self) -> cKDTree:

@@ -22,14 +22,14 @@ DTYPES = {
 
 
 def read_torch_file(path: str | Path) -> Any:
-    """Return what :func:`torch.save` wrote, with arrays for tensors; errors of many kinds for a damaged file."""
+    """Return what :func:`torch.save` wrote, with arrays, as the next version has it; many errors if damaged."""
     with zipfile.ZipFile(path) as archive:
         require_whole(archive, Path(path))
         [pickled] = [name for name in archive.namelist() if name.endswith("/data.pkl")]
         with archive.open(pickled) as stream:
             content = _Tensors(stream, archive, pickled.removesuffix("data.pkl")).load()
     if isinstance(content, Mapping) and content.get("version") == VERSION:
-        _drop_bounds(content)
+        content = upgraded(content)
         require_plausible(content)
     return content
 
@@ -40,15 +40,10 @@ def upgraded(content: Mapping[str, Any]) -> dict[str, Any]:
     for gpc in (content["gpc"], classifier["failure"], *classifier["causes"]):
         raw = gpc["kernel"]
         [parameter] = [name for name in raw if name in ("base_kernel.raw_lengthscale", "base_kernel.raw_offset")]
-        scale, values = (np.logaddexp(np.float32(0), raw[name]) for name in ("raw_outputscale", parameter))
+        with np.errstate(invalid="ignore"):  # NaN is refused afterwards
+            scale, values = (np.logaddexp(np.float32(0), raw[name]) for name in ("raw_outputscale", parameter))
         gpc["kernel"] = {"scale": scale.astype(np.float64), "parameter": values.ravel().astype(np.float64)}
     return {**content, "version": VERSION + 1}
-
-
-def _drop_bounds(content: Mapping[str, Any]) -> None:
-    classifier = content["diagnoser"]["classifier"]
-    for gpc in (content["gpc"], classifier["failure"], *classifier["causes"]):
-        gpc["kernel"] = {name: part for name, part in gpc["kernel"].items() if not name.endswith("_bound")}
 
 
 class _Tensors(pickle.Unpickler):
@@ -77,9 +72,8 @@ class _Tensors(pickle.Unpickler):
 
     def _array(self, storage: np.ndarray, offset: int, shape: tuple, strides: tuple, *_: object) -> np.ndarray:
         last = offset + sum((size - 1) * stride for size, stride in zip(shape, strides, strict=True))
-        if min((offset, *shape, *strides)) < 0 or (0 not in shape and last >= len(storage)):
-            raise ValueError("a tensor claims to be larger than its data in the file")
-        if np.prod(shape, dtype=float) > len(storage):
+        beyond = min((offset, *shape, *strides)) < 0 or (0 not in shape and last >= len(storage))
+        if beyond or np.prod(shape, dtype=float) > len(storage):
             raise ValueError("a tensor claims to be larger than its data in the file")
         place = (storage.ctypes.data, offset, tuple(shape), tuple(strides))
         if place not in self._arrays:

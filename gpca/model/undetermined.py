@@ -50,22 +50,18 @@ class Undetermined:
     @classmethod
     def of(cls, freedom: Freedom) -> Undetermined:
         """Put free directions into words, in the frame and the unit of the points."""
-        center, directions = freedom.center_3, []
+        center, directions = freedom.center_3, list[FreeDirection]()
         for twist_6 in elementary(freedom.free_twists, freedom.metric_6_6):
             along_6 = freedom.metric_6_6 @ twist_6
             deviation = float(np.sqrt(along_6 @ freedom.covariance @ along_6))
             turn_3, shift_3 = twist_6[:3], twist_6[3:]
-            angle = float(np.linalg.norm(turn_3))
-            if angle == 0:
+            if (angle := float(np.linalg.norm(turn_3))) == 0:
                 directions.append(FreeDirection(SLIDE, _upward(shift_3), tuple(center.tolist()), deviation))
                 continue
-            axis_3 = turn_3 / angle
+            axis_3, turned_deg = turn_3 / angle, float(np.rad2deg(deviation * angle))
             through = tuple((center + np.cross(axis_3, shift_3) / angle).tolist())
-            directions.append(
-                FreeDirection(TURN, _upward(axis_3), through, min(float(np.rad2deg(deviation * angle)), ANY_DEG))
-            )
-        is_flat = freedom.flat is not None
-        return cls(tuple(directions), is_flat, freedom.covariance, tuple(center.tolist()))
+            directions.append(FreeDirection(TURN, _upward(axis_3), through, min(turned_deg, ANY_DEG)))
+        return cls(tuple(directions), freedom.flat is not None, freedom.covariance, tuple(center.tolist()))
 
     def outside(self, frame: CanonicalFrame) -> Undetermined:
         """Convert from a canonical frame to the user's frame and unit of length."""
@@ -74,41 +70,30 @@ class Undetermined:
         def placed(point: tuple[float, ...]) -> tuple[float, ...]:
             return tuple((frame.center_3 + frame.diameter * np.array(point)).tolist())
 
-        directions = (
-            replace(
-                each,
-                through=placed(each.through),
-                deviation=each.deviation * (frame.diameter if each.motion == SLIDE else 1.0),
-            )
-            for each in self.directions
-        )
+        directions = []
+        for each in self.directions:
+            deviation = each.deviation * (frame.diameter if each.motion == SLIDE else 1.0)
+            directions.append(replace(each, through=placed(each.through), deviation=deviation))
         covariance = self.covariance * np.outer(unit_6, unit_6)
         return replace(self, directions=tuple(directions), covariance=covariance, center=placed(self.center))
 
     @property
-    def phrases(self) -> list[str]:
-        """Phrases that name all directions."""
-        slides = [each for each in self.directions if each.motion == SLIDE]
-        turns = [each for each in self.directions if each.motion == TURN]
+    def words(self) -> str:
+        """What to know of the pose; empty if it is determined."""
+        slides, turns = ([each for each in self.directions if each.motion == motion] for motion in (SLIDE, TURN))
         phrases = [each.words for each in slides]
         if len(slides) == 2:
             phrases = [f"slide across {axis_in_words(_upward(np.cross(slides[0].axis, slides[1].axis)))}"]
         phrases += ["turn about any axis"] if len(turns) == 3 else [each.words for each in turns]
-        return phrases
-
-    @property
-    def words(self) -> str:
-        """What to know of the pose; empty if it is determined."""
-        parts = [f"the pose is free to {' and to '.join(self.phrases)}"] if self.directions else []
-        return "; ".join([*parts, *([OUT_OF_PLANE] if self.flat else [])])
+        free = f"the pose is free to {' and to '.join(phrases)}" if phrases else ""
+        return "; ".join(filter(None, (free, OUT_OF_PLANE if self.flat else "")))
 
     def lines(self, unit: str) -> list[str]:
         """At most one line of text."""
-        deviations = [
-            f"{each.words} ± "
-            + (f"{each.deviation:.0f}°" if each.motion == TURN else f"{in_decimals(each.deviation)} {unit}")
-            for each in self.directions
-        ]
+        deviations = []
+        for each in self.directions:
+            by = f"{each.deviation:.0f}°" if each.motion == TURN else f"{in_decimals(each.deviation)} {unit}"
+            deviations.append(f"{each.words} ± {by}")
         return [f"free      {'; '.join(deviations)}"] if deviations else []
 
 

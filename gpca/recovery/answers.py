@@ -22,12 +22,7 @@ from gpca.uncertainty.settings import UncertaintySettings
 Explain = Callable[[Registrations], Attribution]
 
 
-class CaseKey(NamedTuple):
-    """A registration to be explained: that of an episode after these actions."""
-
-    explainer: str
-    episode: int
-    actions: tuple[str, ...]
+CaseKey = tuple[str, int, tuple[str, ...]]  # an explainer, an episode, and the actions after which it explains
 
 
 class Answer(NamedTuple):
@@ -53,16 +48,16 @@ class Answers:
         """Explain the registrations that no explainer of that name has seen yet, in a fixed order."""
         wanted = set(wanted) - set(self._answers)
         for explainer, explain in self.explain.items():
-            new = sorted(key for key in wanted if key.explainer == explainer)
+            new = sorted(key for key in wanted if key[0] == explainer)
             if not new:
                 continue
-            records = [record_of(self.episodes[key.episode], key.actions, self.actions, self.budget) for key in new]
+            records = [record_of(self.episodes[e], taken, self.actions, self.budget) for _, e, taken in new]
             attribution = explain(as_registrations(records)[0].without_labels())
             self._answers |= dict(zip(new, answers_of(attribution), strict=True))
 
     def history(self, explainer: str, episode: int, actions: tuple[str, ...]) -> list[Answer]:
         """An explainer's answers at the start and after each of these actions."""
-        return [self._answers[CaseKey(explainer, episode, actions[:n])] for n in range(len(actions) + 1)]
+        return [self._answers[explainer, episode, actions[:n]] for n in range(len(actions) + 1)]
 
 
 def record_of(episode: Episode, taken: tuple[str, ...], actions: Sequence[str], budget: int) -> dict:

@@ -14,10 +14,10 @@ from gpca.errors import InputError, require_known
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
 from gpca.recovery.actions import Action, Holding, Robot
-from gpca.recovery.answers import Answer, Answers, CaseKey, Explain
+from gpca.recovery.answers import Answer, Answers, Explain
 from gpca.recovery.chances import FailureGate, Trial, alarm_threshold, learn_gate
 from gpca.recovery.episodes import Episode
-from gpca.recovery.policies import Case, Decide, Means, Order, PolicyEntry, best_order, policy_entry
+from gpca.recovery.policies import Case, Means, Order, PolicyEntry, best_order, policy_entry
 from gpca.recovery.reenactment import Belief, CauseEffects, KnownModel, believe, reenact
 from gpca.recovery.settings import LoopSettings
 from gpca.reenactment.settings import ReenactmentSettings
@@ -60,8 +60,8 @@ def rehearse(
             if others and settings.budget > 1 and not episode.solved_by((first,), actions, settings):
                 taken.append((episode, (first, others[(episode.number + n) % len(others)])))
     answers = Answers(episodes, {explainer: explain}, names, settings.budget)
-    answers.ask(CaseKey(explainer, episode.number, ()) for episode in episodes)
-    answers.ask(CaseKey(explainer, episode.number, sequence[:-1]) for episode, sequence in taken)
+    answers.ask((explainer, episode.number, ()) for episode in episodes)
+    answers.ask((explainer, episode.number, sequence[:-1]) for episode, sequence in taken)
 
     def state(episode: Episode, sequence: tuple[str, ...]) -> np.ndarray:
         return policy_inputs(episode.observe(sequence), answers.history(explainer, episode.number, sequence)[-1])
@@ -166,11 +166,10 @@ class Loop:
         """A row per episode, policy and step, and the seconds of each, in the same order."""
         entries = {name: policy_entry(name, tuple(self.actions)) for name in policies}
         answers = Answers(self.episodes, self.explain, tuple(self.actions), self.settings.budget)
-        decide = {name: entry.make(self.means) for name, entry in entries.items()}
         taken: dict[tuple[int, str], Taken] = {(e.number, name): () for e in self.episodes for name in policies}
         rows, seconds = [], []
         for step in range(1, self.settings.budget + 1):
-            answers.ask(CaseKey(entries[name].explainer, n, actions) for (n, name), actions in taken.items())
+            answers.ask((entries[name].explainer, n, actions) for (n, name), actions in taken.items())
             following = {}
             for episode in self.episodes:
                 for name in policies:
@@ -178,7 +177,7 @@ class Loop:
                         continue
                     entry, before = entries[name], taken[key]
                     history = answers.history(entry.explainer, episode.number, before) if entry.explainer else []
-                    row, time = self._step(episode, name, entry, decide[name], before, history)
+                    row, time = self._step(episode, name, entry, before, history)
                     rows.append(row | {"step": step})
                     seconds.append({c: row[c] for c in ("episode", "failed", "policy")} | {"step": step} | time)
                     if row["failed"] and row["action"] in self.actions and not row["recovered"]:
@@ -187,8 +186,8 @@ class Loop:
         order = sorted(range(len(rows)), key=lambda n: (rows[n]["episode"], policies.index(rows[n]["policy"]), n))
         return pd.DataFrame([rows[n] for n in order]), pd.DataFrame([seconds[n] for n in order])
 
-    def _decision(self, name: str, decide: Decide, case: Case) -> Decision:
-        decision, subject = decide(case), f"recovery policy '{name}'"
+    def _decision(self, name: str, entry: PolicyEntry, case: Case) -> Decision:
+        decision, subject = entry.decide(case, self.means), f"recovery policy '{name}'"
         if not isinstance(decision, Decision) or not all(isinstance(text, str) for text in vars(decision).values()):
             raise InputError(subject, f"returns a {type(decision).__name__}", "make it return a Decision of texts")
         actions = (*self.actions, *self.means.policy.treatments.values(), QUEUE, NOTHING)
@@ -197,24 +196,21 @@ class Loop:
         return decision
 
     def _step(
-        self, episode: Episode, name: str, entry: PolicyEntry, decide: Decide, before: Taken, history: Sequence[Answer]
+        self, episode: Episode, name: str, entry: PolicyEntry, before: Taken, history: Sequence[Answer]
     ) -> tuple[dict, dict]:
         reenacted = self.reenactor.reenact(episode, before) if entry.reenacts else None
         started = perf_counter()
-        decision = self._decision(
-            name,
-            decide,
-            Case(
-                actions=before,
-                scores_T_C=np.array([answer.scores_C for answer in history]) if history else None,
-                bald_T=np.array([answer.bald for answer in history]) if history else None,
-                observed_F=episode.observe(()) if entry.gated else None,
-                known_F=policy_inputs(episode.observe(before), history[-1]) if entry.learns else None,
-                cause=episode.situation.cause if entry.oracle and episode.failed else "",
-                random=generator(*self.axes, "policy", episode.number),
-                reenacted=reenacted,
-            ),
+        case = Case(
+            actions=before,
+            scores_T_C=np.array([answer.scores_C for answer in history]) if history else None,
+            bald_T=np.array([answer.bald for answer in history]) if history else None,
+            observed_F=episode.observe(()) if entry.gated else None,
+            known_F=policy_inputs(episode.observe(before), history[-1]) if entry.learns else None,
+            cause=episode.situation.cause if entry.oracle and episode.failed else "",
+            random=generator(*self.axes, "policy", episode.number),
+            reenacted=reenacted,
         )
+        decision = self._decision(name, entry, case)
         spent = perf_counter() - started + (reenacted.seconds if reenacted else 0.0)
         last = history[-1] if history else UNEXPLAINED
         old, new, action_seconds, recovered = episode.outcomes[before], None, 0.0, False

@@ -30,16 +30,13 @@ class Case:
     """The inputs of a decision."""
 
     actions: tuple[str, ...]  # taken so far
-    scores_T_C: np.ndarray | None  # of the explainer at the start and after each action; None without one
-    bald_T: np.ndarray | None
-    observed_F: np.ndarray | None  # at the start (:data:`gpca.recovery.actions.OBSERVED`), for the gate
-    known_F: np.ndarray | None  # all features (:func:`gpca.recovery.loop.policy_inputs`), for trained policies
+    scores_T_C: Any  # of the explainer at the start and after each action; this and the next are None without one
+    bald_T: Any
+    observed_F: Any  # at the start (:data:`gpca.recovery.actions.OBSERVED`), for the gate; else None
+    known_F: Any  # all features (:func:`gpca.recovery.loop.policy_inputs`), for trained policies; else None
     cause: str  # of the failure, for the oracle only; otherwise empty
     random: np.random.Generator  # of the case, restarted for every decision
     reenacted: CauseEffects | None = None  # the current registration, for policies that read it
-
-
-Decide = Callable[[Case], Decision]
 
 
 @dataclass(frozen=True)
@@ -55,116 +52,84 @@ class Means:
     alarm: float | None = None
 
 
-MakePolicy = Callable[[Means], Decide]
+Decide = Callable[[Case, Means], Decision]
 
 
-def follow_scores(means: Means) -> Decide:
+def follow_scores(case: Case, means: Means) -> Decision:
     """Follow an explainer's scores and queue uncertain cases (:class:`gpca.causes.policy.RecoveryPolicy`)."""
-    policy = means.policy
-    concept_of = {action: concept for concept, action in policy.treatments.items()}
-
-    def decide(case: Case) -> Decision:
-        scores_T_C, bald_T = case.scores_T_C, case.bald_T
-        assert scores_T_C is not None and bald_T is not None
-        bald_T = np.zeros(len(scores_T_C)) if np.isnan(bald_T).any() else bald_T
-        before = []
-        for step, action in enumerate(case.actions):
-            column = CONCEPTS.index(concept_of[action])
-            fall = scores_T_C[step, column] - scores_T_C[step + 1, column]
-            before.append(Treated(concept_of[action], float(fall)))
-        return policy.decide(scores_T_C[-1], float(bald_T[-1]), before)
-
-    return decide
+    scores_T_C, bald_T = case.scores_T_C, case.bald_T
+    concept_of = {action: concept for concept, action in means.policy.treatments.items()}
+    bald_T = np.zeros(len(scores_T_C)) if np.isnan(bald_T).any() else bald_T
+    before = []
+    for step, action in enumerate(case.actions):
+        column = CONCEPTS.index(concept_of[action])
+        fall = scores_T_C[step, column] - scores_T_C[step + 1, column]
+        before.append(Treated(concept_of[action], float(fall)))
+    return means.policy.decide(scores_T_C[-1], float(bald_T[-1]), before)
 
 
-def never_queue(means: Means) -> Decide:
+def never_queue(case: Case, means: Means) -> Decision:
     """Follow the scores without queueing, so that explainers are compared by their actions alone."""
     limits = means.policy.thresholds
     sure = Thresholds(uncertain=np.inf, dominant=0.0, improvement=limits.improvement, attempts=1_000_000)
-    return follow_scores(replace(means, policy=replace(means.policy, thresholds=sure)))
+    return follow_scores(case, replace(means, policy=replace(means.policy, thresholds=sure)))
 
 
-def weigh_chances(means: Means, alarmed: bool = False) -> Decide:
+def weigh_chances(case: Case, means: Means, alarmed: bool = False) -> Decision:
     """Maximize the expected utility (:class:`gpca.recovery.chances.ExpectedUtility`), if alarmed of a wrong pose."""
-    utility = means.utility
-    assert utility is not None
-
-    def decide(case: Case) -> Decision:
-        assert case.known_F is not None
-        return utility.decide(case.known_F, case.actions, alarmed)
-
-    return decide
+    assert means.utility is not None
+    return means.utility.decide(case.known_F, case.actions, alarmed)
 
 
-def act_at_random(means: Means) -> Decide:
-
-    def decide(case: Case) -> Decision:
-        # The random numbers restart at every decision, so earlier draws are repeated.
-        drawn = case.random.integers(len(means.actions), size=len(case.actions) + 1)[-1]
-        return Decision(means.actions[drawn], "", "at random")
-
-    return decide
+def act_at_random(case: Case, means: Means) -> Decision:
+    # The random numbers restart at every decision, so earlier draws are repeated.
+    drawn = case.random.integers(len(means.actions), size=len(case.actions) + 1)[-1]
+    return Decision(means.actions[drawn], "", "at random")
 
 
-def follow_reenactment(means: Means) -> Decide:
+def follow_reenactment(case: Case, means: Means) -> Decision:
     """Treat the cause with the largest effect in the re-enactment; each action repeats only after all others."""
+    assert case.reenacted is not None
     treatments = means.policy.treatments
-
-    def decide(case: Case) -> Decision:
-        assert case.reenacted is not None
-        gains = dict(zip(CONCEPTS, case.reenacted.phi_3.tolist(), strict=True))
-        fewest = min(case.actions.count(action) for action in treatments.values())
-        untried = [concept for concept in gains if case.actions.count(treatments[concept]) == fewest]
-        best = max(untried, key=gains.__getitem__)
-        return Decision(treatments[best], best, f"{best} adds {gains[best]:.3f} of the diameter to the error")
-
-    return decide
+    gains = dict(zip(CONCEPTS, case.reenacted.phi_3.tolist(), strict=True))
+    fewest = min(case.actions.count(action) for action in treatments.values())
+    untried = [concept for concept in gains if case.actions.count(treatments[concept]) == fewest]
+    best = max(untried, key=gains.__getitem__)
+    return Decision(treatments[best], best, f"{best} adds {gains[best]:.3f} of the diameter to the error")
 
 
-def gated(make: MakePolicy) -> MakePolicy:
+def gated(decide: Decide) -> Decide:
     """Let a policy act only if the gate, or the re-enactment that it reads, raises an alarm at the start."""
 
-    def make_gated(means: Means) -> Decide:
-        decide, good = make(means), Decision(NOTHING, "", "it is taken for good")
+    def alarms(case: Case, means: Means) -> bool:
+        if case.reenacted is not None and means.alarm is not None:
+            return case.reenacted.belief.failure > means.alarm
+        assert means.gate is not None
+        return means.gate.alarms(case.observed_F)
 
-        def alarms(case: Case) -> bool:
-            if case.reenacted is not None and means.alarm is not None:
-                return case.reenacted.belief.failure > means.alarm
-            assert means.gate is not None and case.observed_F is not None
-            return means.gate.alarms(case.observed_F)
-
-        return lambda case: decide(case) if case.actions or alarms(case) else good
-
-    return make_gated
+    good = Decision(NOTHING, "", "it is taken for good")
+    return lambda case, means: decide(case, means) if case.actions or alarms(case, means) else good
 
 
-def follow_truth(means: Means) -> Decide:
+def follow_truth(case: Case, means: Means) -> Decision:
     """Repeat the action that treats the true cause; do nothing without a cause."""
-    treatments = means.policy.treatments
-    return lambda case: Decision(treatments.get(case.cause, NOTHING), case.cause, "told the cause")
+    return Decision(means.policy.treatments.get(case.cause, NOTHING), case.cause, "told the cause")
 
 
-def repairing(make: MakePolicy) -> MakePolicy:
+def repairing(decide: Decide) -> Decide:
     """Let a policy choose only after the pose was searched anew, for which nothing in the world has to move."""
 
-    def make_repairing(means: Means) -> Decide:
-        decide, first = make(means), means.policy.treatments["pose"]
-        return lambda case: decide(case) if case.actions else Decision(first, "", "repair before anything moves")
+    def repair_first(case: Case, means: Means) -> Decision:
+        first = Decision(means.policy.treatments["pose"], "", "repair before anything moves")
+        return decide(case, means) if case.actions else first
 
-    return make_repairing
+    return repair_first
 
 
-def follow_sequence(order: Order = (), reason: str = "next of a fixed sequence") -> MakePolicy:
+def follow_sequence(case: Case, means: Means, order: Order = (), reason: str = "next of a fixed sequence") -> Decision:
     """Take the actions of a sequence in turn, whatever is observed; by default the best order on the rehearsals."""
-
-    def make(means: Means) -> Decide:
-        taken = order or means.order
-        return lambda case: Decision(taken[len(case.actions) % len(taken)], "", reason)
-
-    return make
-
-
-follow_rehearsed = follow_sequence()
+    taken = order or means.order
+    return Decision(taken[len(case.actions) % len(taken)], "", reason)
 
 
 def best_order(
@@ -190,7 +155,7 @@ class PolicyEntry:
     """A registered policy."""
 
     title: str  # in tables
-    make: MakePolicy
+    decide: Decide
     explainer: str = ""  # its name (:mod:`gpca.explainers.registry`), or empty
     queues: bool = False  # leaves cases to a person, whose labels its explainer can learn
     learns: bool = False  # uses the chances learned on the rehearsals
@@ -213,12 +178,12 @@ POLICIES = {
     "utility": PolicyEntry("Expected utility, learned", weigh_chances, **_LEARNED, informed=False),
     "utility_acting": PolicyEntry("Expected utility, alarmed", weigh_alarmed, **_LEARNED),
     "utility_gated": PolicyEntry("Expected utility, gated", gated(weigh_alarmed), **_LEARNED, **_GATED),
-    "error_only": PolicyEntry("Error only, gated", gated(follow_rehearsed), rehearsed=True, **_GATED),
-    "error_only_acting": PolicyEntry("Error only, alarmed", follow_rehearsed, rehearsed=True),
+    "error_only": PolicyEntry("Error only, gated", gated(follow_sequence), rehearsed=True, **_GATED),
+    "error_only_acting": PolicyEntry("Error only, alarmed", follow_sequence, rehearsed=True),
     "reenact": PolicyEntry("Re-enactment", follow_reenactment, reenacts=True),
     "reenact_gated": PolicyEntry("Re-enactment, gated", gated(follow_reenactment), **_BY_REENACTMENT),
     "error_only_reenact": PolicyEntry(
-        "Error only, re-enactment's gate", gated(follow_rehearsed), rehearsed=True, **_BY_REENACTMENT
+        "Error only, re-enactment's gate", gated(follow_sequence), rehearsed=True, **_BY_REENACTMENT
     ),
     "shap_removal": PolicyEntry("SHAP, remedies, residual", never_queue, explainer="shap_removal_residual"),
     "softmax_head": PolicyEntry("Softmax head", never_queue, explainer="softmax_head"),
@@ -246,11 +211,13 @@ def policies(actions: Sequence[str]) -> dict[str, PolicyEntry]:
     entries = named_policies()
     words = {action: action.replace("_", " ") for action in actions}
     for action in actions:
-        entries[ALWAYS + action] = PolicyEntry(f"Always: {words[action]}", follow_sequence((action,), "always"))
+        entries[ALWAYS + action] = PolicyEntry(
+            f"Always: {words[action]}", partial(follow_sequence, order=(action,), reason="always")
+        )
     for length in range(2, len(actions) + 1):
         for order in permutations(actions, length):
             title = ", then ".join(words[action] for action in order).capitalize()
-            entries["_".join((SEQUENCE, *order))] = PolicyEntry(title, follow_sequence(order))
+            entries["_".join((SEQUENCE, *order))] = PolicyEntry(title, partial(follow_sequence, order=order))
     return entries
 
 

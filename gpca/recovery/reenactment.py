@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
 
@@ -28,22 +28,15 @@ LEAST_COVERED = 0.05  # share of the model; below it, a hypothesis does not dete
 THINNED = 4  # step between the compared pixels, in both directions
 
 
-class Appearance:
-    """Thinned pixels of shots, to be compared with the object's mesh."""
+def appearance(shots: Sequence[Shot], mesh: MeshScene) -> Callable[[np.ndarray, float], float]:
+    """Return what tells the share of pixels that agree with a pose, of those that show the object or should."""
+    thin = np.s_[THINNED // 2 :: THINNED, THINNED // 2 :: THINNED]
+    views = [(each.T_world_camera, each.camera.rays()[thin], each.depth_m[thin], each.mask[thin]) for each in shots]
 
-    def __init__(self, shots: Sequence[Shot], mesh: MeshScene) -> None:
-        thinned = np.s_[THINNED // 2 :: THINNED, THINNED // 2 :: THINNED]
-        self._mesh = mesh
-        self._views = [
-            (shot.T_world_camera, shot.camera.rays()[thinned], shot.depth_m[thinned], shot.mask[thinned])
-            for shot in shots
-        ]
-
-    def explained(self, T_world_object: np.ndarray, reach_m: float) -> float:
-        """Return the share of pixels, of those that show the object or should, whose depth agrees with a pose."""
+    def explained(T_world_object: np.ndarray, reach_m: float) -> float:
         agreeing = judged = 0
-        for T_world_camera, rays, depth_m, is_object in self._views:
-            rendered_m = self._mesh.along(rays, inverse(T_world_object) @ T_world_camera).depth_m
+        for T_world_camera, rays, depth_m, is_object in views:
+            rendered_m = mesh.along(rays, inverse(T_world_object) @ T_world_camera).depth_m
             measured = depth_m > 0
             hidden = ~is_object & (depth_m < rendered_m - reach_m)
             expected = np.isfinite(rendered_m)
@@ -51,6 +44,8 @@ class Appearance:
             agreeing += (measured & is_object & near).sum()
             judged += (measured & (is_object | (expected & ~hidden))).sum()
         return float(agreeing / max(1, judged))
+
+    return explained
 
 
 @dataclass(frozen=True)
@@ -114,10 +109,10 @@ def believe(
     cloud_m = cloud_m[np.sort(random.permutation(len(cloud_m))[:OBSERVED_POINTS])]
     observed = transform(inverse(T_init), cloud_m) / d
     T_result = scale_translation(inverse(holding.T_world_object) @ T_init, 1 / d)
-    appearance = Appearance(holding.shots, shape.mesh)
+    explained_at = appearance(holding.shots, shape.mesh)
 
     def evidence(T: np.ndarray, width: float) -> float:
-        explained = appearance.explained(_placed(holding, shape, T), d * max(NEAR, 2.5 * width))
+        explained = explained_at(_placed(holding, shape, T), d * max(NEAR, 2.5 * width))
         return PIXELS * (explained * float(np.log(1 - UNEXPLAINED)) + (1 - explained) * float(np.log(UNEXPLAINED)))
 
     hypotheses = find_hypotheses(observed, shape.surface, T_result[None], settings, random, evidence)

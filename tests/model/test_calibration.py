@@ -10,7 +10,7 @@ from gpca.model.calibration import LabeledRegistrations
 from gpca.model.diagnoser import Diagnoser
 from gpca.model.explainer import Explainer
 from gpca.model.file import Model
-from gpca.model.result import calibrated_at
+from gpca.model.result import level_at
 
 from .test_diagnoser import FAILED
 
@@ -70,9 +70,9 @@ def test_only_what_a_user_labeled_is_promised_at_the_tolerances_of_the_labels(mo
     assert [level.tolerance for level in diagnoser.levels] == [0.02]
     two = labeled(60, 0.05).set_in(diagnoser)
     assert [level.tolerance for level in two.levels] == [0.02, 0.05]
-    assert calibrated_at(two.levels, 0.03).guarantee.labeled
+    assert level_at(two.levels, 0.03).guarantee.labeled
     named = labeled(60, 0.05, labels=["right", "noise", "right", "pose"] * 15).set_in(diagnoser)
-    assert calibrated_at(named.levels, 0.03).guarantee is None  # sets of other states
+    assert level_at(named.levels, 0.03).guarantee is None  # sets of other states
     again = labeled(80, 0.02).set_in(two)
     assert [level.guarantee.samples for level in again.levels] == [80, 60]
     shares = [

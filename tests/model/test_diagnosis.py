@@ -1,14 +1,14 @@
 """What a re-enactment says to a user: other poses in plain words, and what each cause does."""
 
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from gpca.causes.truth import ALL, shapley_values
-from gpca.model.diagnosis import Reenacted, axis_in_words, outside
+from gpca.model.diagnosis import Reenacted, axis_in_words, outside, plain
 from gpca.objects.canonical import CanonicalFrame
 from gpca.reenactment.enactment import Enactment
 from gpca.reenactment.hypotheses import Hypothesis
@@ -105,9 +105,9 @@ def test_a_pose_takes_the_users_source_to_the_users_target(drill):
     source = np.random.default_rng(1).normal(size=(5, 3))
     expected = transform(T, frame.coordinates(transform(T_init, source)))
     np.testing.assert_allclose(frame.coordinates(transform(converted.poses[0].T_target_source, source)), expected)
-    plain = json.loads(json.dumps(converted.as_dict()))
-    assert np.array(plain["poses"][0]["T_target_source"]).shape == (4, 4)
-    assert set(plain) == {
+    values = json.loads(json.dumps(asdict(converted, dict_factory=plain)))
+    assert np.array(values["poses"][0]["T_target_source"]).shape == (4, 4)
+    assert set(values) == {
         "error",
         "effects",
         "noise",

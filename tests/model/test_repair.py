@@ -21,7 +21,7 @@ from gpca.model.repair import (
     propose,
     unseen,
 )
-from gpca.model.result import Calibrated, Evidence, ResultJudge, calibrated_at
+from gpca.model.result import Calibrated, Evidence, ResultJudge, level_at
 from gpca.reenactment.surface import ModelSurface
 from gpca.rigid import inverse, transform
 
@@ -73,9 +73,9 @@ def test_the_alarm_and_the_promise_about_repairs_are_stricter_than_the_threshold
     assert Calibrated.from_state(stricter.state()) == stricter
     old = {name: value for name, value in level.state().items() if name != "repaired_below"}
     assert Calibrated.from_state(old).repaired_below is None
-    between = calibrated_at([stricter, Calibrated(0.05, 0.4, guarantee, 0.02)], 0.04)
+    between = level_at([stricter, Calibrated(0.05, 0.4, guarantee, 0.02)], 0.04)
     assert between.repaired_below == 0.01
-    assert calibrated_at([level, stricter], 0.03).repaired_below is None
+    assert level_at([level, stricter], 0.03).repaired_below is None
 
 
 @pytest.fixture(scope="module")

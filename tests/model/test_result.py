@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gpca.guarantee.guarantee import calibrate
-from gpca.model.result import TOLERANCES, Calibrated, Evidence, ResultJudge, calibrated_at
+from gpca.model.result import TOLERANCES, Calibrated, Evidence, ResultJudge, level_at
 
 
 def evidence_of(error_N, seed=0):
@@ -73,9 +73,9 @@ def test_what_is_promised_between_two_tolerances_is_what_both_allow_and_beyond_t
         scores_N_5 = np.column_stack([nominal_N, *[0 * nominal_N] * 4])
         levels.append(Calibrated(tolerance, threshold, calibrate(scores_N_5, state_N)))
     for level in levels:
-        rounded = calibrated_at(levels, level.tolerance * (1 + 1e-15))
+        rounded = level_at(levels, level.tolerance * (1 + 1e-15))
         assert (rounded.threshold, rounded.guarantee) == (level.threshold, level.guarantee)
-    between = calibrated_at(levels, 0.025)
+    between = level_at(levels, 0.025)
     one, two = (level.guarantee for level in levels)
     assert between.threshold == 0.6
     assert between.guarantee.state_sets.limits == tuple(map(max, one.state_sets.limits, two.state_sets.limits))
@@ -83,4 +83,4 @@ def test_what_is_promised_between_two_tolerances_is_what_both_allow_and_beyond_t
     assert alarms[2].good_below == min(alarm.good_below for alarm in alarms)
     assert alarms[2].failed_from == max(alarm.failed_from for alarm in alarms)
     for beyond, threshold in ((0.01, 0.6), (0.2, 0.4)):
-        assert calibrated_at(levels, beyond) == Calibrated(beyond, threshold)
+        assert level_at(levels, beyond) == Calibrated(beyond, threshold)

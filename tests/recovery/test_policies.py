@@ -1,5 +1,6 @@
 """Policies: what they need, and the actions that they choose."""
 
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -22,7 +23,7 @@ def case(actions=(), scores=None, bald=None, observed=None, known=None, cause=""
 
 
 def made(name, **means):
-    return policy_entry(name, ACTIONS).make(Means(POLICY, ACTIONS, **means))
+    return partial(policy_entry(name, ACTIONS).decide, means=Means(POLICY, ACTIONS, **means))
 
 
 def test_gpca_follows_the_scores_and_queues_what_is_uncertain_while_the_acting_one_never_does():

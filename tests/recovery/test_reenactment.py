@@ -13,7 +13,7 @@ from gpca.objects.camera import Camera, MeshScene
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.actions import ACTIONS, Robot
 from gpca.recovery.episodes import register_after
-from gpca.recovery.reenactment import Appearance, KnownModel, believe, reenact, seen_surface
+from gpca.recovery.reenactment import KnownModel, appearance, believe, reenact, seen_surface
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.rigid import inverse, rigid_motion, scale_translation
 from tests.failures import LOOP
@@ -117,15 +117,15 @@ def shot_of(cube, T_camera_object, hidden_to=0):
 
 
 def test_the_true_pose_explains_all_and_others_the_less_the_farther_they_are(cube):
-    appearance = Appearance([shot_of(cube, at(0, 1))], cube)
-    shares = [appearance.explained(at(x_m, 1), REACH_M) for x_m in (0, 0.1, 0.2, 2)]
+    explained = appearance([shot_of(cube, at(0, 1))], cube)
+    shares = [explained(at(x_m, 1), REACH_M) for x_m in (0, 0.1, 0.2, 2)]
     assert shares[0] == 1
     assert shares == sorted(shares, reverse=True) and shares[-1] == 0
-    assert appearance.explained(at(0, 1.1), REACH_M) == 0  # behind what was measured: it would be elsewhere
-    assert appearance.explained(at(0, 1.1), 0.2) > 0.8
+    assert explained(at(0, 1.1), REACH_M) == 0  # behind what was measured: it would be elsewhere
+    assert explained(at(0, 1.1), 0.2) > 0.8
 
 
 def test_what_stands_in_front_says_nothing(cube):
-    appearance = Appearance([shot_of(cube, at(0, 1), hidden_to=40)], cube)
-    assert appearance.explained(at(0, 1), REACH_M) == 1
-    assert appearance.explained(at(0.2, 1), REACH_M) < 0.8  # there the camera looks through it at the wall
+    explained = appearance([shot_of(cube, at(0, 1), hidden_to=40)], cube)
+    assert explained(at(0, 1), REACH_M) == 1
+    assert explained(at(0.2, 1), REACH_M) < 0.8  # there the camera looks through it at the wall

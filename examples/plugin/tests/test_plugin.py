@@ -55,9 +55,9 @@ def test_a_strategy():
 
 
 def test_a_policy():
-    decide = policy_entry("my_last_first", ACTIONS).make(Means(RecoveryPolicy(), ACTIONS))
     case = Case(("new_view",), None, None, None, None, "", np.random.default_rng(0))
-    assert decide(case).action == "reinitialize"
+    decision = policy_entry("my_last_first", ACTIONS).decide(case, Means(RecoveryPolicy(), ACTIONS))
+    assert decision.action == "reinitialize"
 
 
 def test_a_kind_of_source(tmp_path):
