@@ -24,9 +24,9 @@ HEAD = """\
 
 <!-- Made by `python docs/cli.py` from what the commands declare; edit their help instead. -->
 
-`gpca` and `python -m gpca` are the same. Results go to stdout, everything else to stderr. A mistake gives one line and exit
-status 2 (`check-config` lists all mistakes); a failed check gives status 1. `gpca --version` prints the version. The steps of the workflow are
-[targets of Snakemake](../README.md#parts-of-a-run), not commands.
+`gpca` and `python -m gpca` are the same. Results go to stdout, everything else to stderr. A mistake gives one line and
+exit status 2 (`check-config` lists all mistakes); a failed check gives status 1. `gpca --version` prints the version.
+The steps of the workflow are [targets of Snakemake](../README.md#parts-of-a-run), not commands.
 """
 
 
