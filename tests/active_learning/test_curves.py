@@ -95,9 +95,7 @@ def test_metrics_are_tidy_and_gains_are_paired_with_random_of_the_same_start(fil
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", r"seed3.csv: is empty"),
         ("setting,held_out,labels,accuracy\n", r"column 'accuracy_new' is missing"),
-        ("setting,held_out,labels,accuracy,accuracy_new\n", r"has no rows"),
         ("setting,held_out,labels,accuracy,accuracy_new\na,b,0,x,1\n", r"'accuracy' contains values that are not fin"),
     ],
 )
@@ -105,10 +103,3 @@ def test_a_damaged_file_is_named(files, text, message):
     files["bald"].write_text(text)
     with pytest.raises(InputError, match=message):
         collect_curves(files.values(), target=0.9)
-
-
-def test_no_files_and_a_name_of_another_form_are_named(files):
-    with pytest.raises(InputError, match="no files were given"):
-        collect_curves([], target=0.9)
-    with pytest.raises(InputError, match="is not named"):
-        collect_curves([files["bald"].rename(files["bald"].with_name("bald.csv"))], target=0.9)

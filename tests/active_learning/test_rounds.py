@@ -86,15 +86,6 @@ def test_a_rare_concept_has_its_share_as_far_as_there_are_samples(embedded, init
     assert (counted["noise"] + counted["pose"], counted["overlap"]) == left
 
 
-def test_projecting_a_task_changes_nothing_that_the_classifier_says(embedded, gpc, task):
-    plain = make_task(embedded, "overlap", SETTINGS, "tiny", 0)
-    for part in ("initial", "pool", "test"):
-        one, other = getattr(plain, part), getattr(task, part)
-        assert len(one) == len(other)
-        assert one.concept_N.tolist() == other.concept_N.tolist()
-        assert np.array_equal(gpc.attribute(one.h)[0], gpc.attribute(other.h)[0])
-
-
 @pytest.mark.parametrize(
     "labels, batch, expected",
     [(8, 4, [0, 4, 8]), (10, 4, [0, 4, 8, 10]), (3, 5, [0, 3]), (40, 10, [0, 10, 20, 24]), (0, 4, [0])],
@@ -110,14 +101,6 @@ def test_the_concept_held_out_is_learned(task, gpc, strategy):
     assert steps["accuracy"][-1] > 0.9
     assert steps["epochs"][0] == 0
     assert all(0 < epochs <= SETTINGS.iterations for epochs in steps["epochs"][1:])
-
-
-def test_learning_the_whole_pool_does_not_depend_on_its_order(task, gpc):
-    one, other = (
-        learned(task, gpc, strategy, labels=24, tolerance=1e-8, iterations=500) for strategy in ("random", "bald")
-    )
-    for name in ("labels", "new_labels", "accuracy", "accuracy_new"):
-        assert one[name][-1] == other[name][-1]
 
 
 def recorded_queries(monkeypatch):

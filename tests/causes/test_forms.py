@@ -11,7 +11,6 @@ from gpca.causes.settings import CauseSettings, CauseSeverities, Form
 from gpca.pairs.perturbation import NOISE, OVERLAP
 
 SEVERITIES = CauseSeverities(outliers=(0.1, 0.2), noise=(0.03, 0.03), crop=(0.4, 0.4))
-USUAL = CauseSettings(severities=SEVERITIES, points=(512, 512))
 
 
 def drawn(subjects, applied=(True, True, True), seed=0, **form):

@@ -186,8 +186,6 @@ HEAD, TABLE_HEAD = ",".join(TIDY) + "\n", ",".join(HEADS) + "\n"
     ("broken", "content", "message"),
     [
         ("metrics.csv", "attribution\n1\n", "is neither tidy metrics nor a table; regenerate it"),
-        ("metrics.csv", "attribution\n", "has no rows; regenerate it"),
-        ("metrics.csv", "", "is empty; regenerate it"),
         ("metrics.csv", HEAD + "a,ycb,gpca,accuracy,all,0,nan\n", "'value' is 'nan', not a finite number; regenerate"),
         ("metrics.csv", HEAD + "a,ycb,gpca,accuracy,all,0,0.9,0.8\n", "has rows with more entries than columns"),
         ("metrics.csv", HEAD + "a,ycb,gpca\n", "'value' is '', not a finite number"),
@@ -196,9 +194,7 @@ HEAD, TABLE_HEAD = ",".join(TIDY) + "\n", ",".join(HEADS) + "\n"
         (TABLE, TABLE_HEAD + "ycb,gpca,,,,5,100,False\n", "has no mean at all"),
         (TABLE, TABLE_HEAD + "ycb,gpca,1,1,2,5,-100,False\n", "counts fewer than no samples or seeds"),
         ("metrics.csv.provenance.json", '{"config_sha256": [1]}', "'config_sha256' is no dict; make metrics.csv again"),
-        ("metrics.csv.provenance.json", '{"device": []}', "'device' is no dict"),
         ("metrics.csv.provenance.json", '{"device": ', "is not a provenance record"),
-        (TABLE, TABLE_HEAD + "ycb,gpca,many,1,2,5,100,False\n", "'mean' is 'many', not a finite number"),
     ],
 )
 def test_a_broken_file_is_named(folders, capsys, broken, content, message):
@@ -250,10 +246,7 @@ def test_the_config_is_that_of_the_working_directory_or_the_one_named(folders, c
     ("content", "message"),
     [
         ("seeds: [0]", "has no section 'reference'"),
-        ("- a list", "has no keys at its top level"),
-        ("a: b: c", "is neither YAML nor JSON"),
         ("reference: {tolerances: {}}", "setting tolerances.correlation: is missing"),
-        ("reference: 3", "has no section 'reference'"),
     ],
 )
 def test_a_config_that_does_not_say_what_agrees_is_named(folders, capsys, tmp_path, content, message):

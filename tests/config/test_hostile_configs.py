@@ -92,10 +92,6 @@ def frames(**more):
     return {"real_world": {"datasets": {"mine": {"location": "parts", "split": "parts"} | more}}}
 
 
-def learner(**settings):
-    return {"learners": {"learner_forest": settings}}
-
-
 VALUES = [
     ({"scans": {"datasets": {"mine": {"title": "t", "kind": "npz", "location": "/"}}}}, "is the root of the file"),
     (source(location="/"), "sources.mine", "is the root of the file system"),
@@ -103,28 +99,20 @@ VALUES = [
     # the run's own folder
     ({"run": "smoke\n"}, "run", "control character"),
     ({"run": "reference"}, "run", "choose another name"),
-    ({"run": "Reference"}, "run", "choose another name"),
-    ({"run": "a/b"}, "run"),
     ({"run": "x" * 101}, "run", "at most 100"),
     # sizes that cannot be
-    ({"registrations": {"train": 10**12}}, "registrations.train", "less than or equal to"),
     ({"registrations": {"train": 10**6, "cloud_points": 65536}}, "registrations.train", "GiB"),
     ({"real_world": {"test": 10**6}, "registrations": {"cloud_points": 65536}}, "real_world.train", "GiB"),
     ({"causes": {"train": 10**6, "points": [64, 65536]}}, "causes.train", "GiB", "lower causes.points"),
-    ({"causes": {"starts": 12}}, "causes.starts", "greater than or equal to 13"),
     ({"causes": {"points": [1024, 128]}}, "causes: causes points", "descending"),
-    ({"causes": {"small": {"crop": 0.96}}}, "causes.small.crop", "less than or equal to"),
     ({"success": {"error": 0.01}}, "nominal 0.02 exceeds failed 0.01"),
     ({"causes": {"limits": {"failed": 0.05}}}, "causes.limits.failed", "set success.error"),
     ({"model": {"causes": {"limits": {"failed": 0.05}}}}, "model.causes.limits.failed", "set success.error"),
     ({"success": {"curve": [0.05, 0.02]}}, "success curve", "ascending"),
     ({"causes": {"shares": {"geometry": 0.5}}}, "causes shares", "add up to 1.5"),
-    ({"causes": {"icp_points": 512}}, "causes.icp_points", "unknown"),
     # controls
     ({"controls": {"draw_points": [512, 200]}}, "controls: setting draw_points", "descending"),
-    ({"controls": {"controls": ["gravity"]}}, "controls.controls", "gravity"),
     ({"controls": {"explainers": {"gpca_pair_dgcnn": {"epochs": 0}}}}, "controls.explainers.gpca_pair_dgcnn", "epochs"),
-    ({"encoders": {"dgcnn": {"head": "three_layer"}}}, "encoders.dgcnn.head", "'linear' or"),
     ({"controls": {"explainers": {"shap_removal": {}}}}, "controls.explainers.shap_removal", "more Monte-Carlo ICP"),
     ({"controls": {"explainers": {"nobody": False}}}, "controls.explainers", "no explainer 'nobody'"),
     # more than there are samples or points
@@ -139,21 +127,11 @@ VALUES = [
     ({"explainers": {"analytical_gpc": {"neighbours": 2049}}}, "explainers.analytical_gpc.neighbours", "2048 points"),
     ({"encoders": {"dgcnn": {"options": {"k": 513}}}}, "513 neighbors are too many for draws of 512 points"),
     ({"encoders": {"pointnet": {"draw_points": 4096}}}, "encoders.pointnet", "clouds that have at most 2048", "lower"),
-    (
-        {"registrations": {"cloud_points": 400}},
-        "encoders.dgcnn",
-        "draws 512 points",
-        "raise registrations.cloud_points",
-    ),
+    ({"registrations": {"cloud_points": 400}}, "encoders.dgcnn", "draws 512 points", "raise registrations.cloud_"),
     ({"diagnosis": {"encoder": {"draw_points": 2048}}}, "diagnosis.encoder", "at most 1024", "raise causes.points"),
     ({"seeds": [10**400]}, "seeds.0", "less than or equal to"),
-    ({"seeds": [True]}, "seeds.0"),
-    ({"encoders": {"dgcnn": {"options": {"k": 10**9}}}}, "encoders.dgcnn", "neighbors are too many"),
-    ({"encoders": {"dgcnn": {"learning_rate": 1e-400}}}, "encoders.dgcnn.learning_rate"),
     ({"explainers": {"residuals_forest": {"floor": 1e300}}}, "explainers.residuals_forest", "floor"),
-    ({"recovery": {"actions": {"denoise": {"frames": 10**12}}}}, "recovery.actions.denoise", "frames"),
-    (learner(trees=10**12), "learners.learner_forest", "trees"),
-    (learner(trees=float("nan")), "learners.learner_forest", "trees"),
+    ({"learners": {"learner_forest": {"trees": 10**12}}}, "learners.learner_forest", "trees"),
     ({"learners": {"learner_logistic": {"inverse_regularisation": float("inf")}}}, "inverse_regularisation"),
     # names
     ({"sources": {"x" * 101: source()["sources"]["mine"]}}, "sources"),
@@ -193,10 +171,8 @@ VALUES = [
     (source(files=["."]), "sources.mine", "pattern"),
     (source(files=["a**b"]), "sources.mine", "a**b"),
     (source(files=[]), "sources.mine.files"),
-    (source(files="*.ply"), "sources.mine.files", "give a list"),
     # addresses
     (source(url="https://a.org/b\nc"), "sources.mine.url", "control character"),
-    (source(url="file:///etc/passwd"), "sources.mine.url"),
     (source(url="https://a.org/b.zip", sha256="0" * 64 + "\n"), "sources.mine.sha256", "control character"),
 ]
 

@@ -107,35 +107,27 @@ def test_models_and_frames_may_come_in_archives_of_their_own(scenes, tmp_path):
         read_models(Dataset("tiny", folders[1:]), apart.frames())
 
 
-NOT_FINITE = "contains a number that is not finite"
-ROTATION = [1, 0, 0, 0, 1, 0, 0, 0, 1]
-
-
 def camera_values(focal_px=150.0, u=79.5, v=59.5, y=150.0, below=0, last=(0, 0, 1)):
     return [focal_px, 0, u, below, y, v, *last]
 
 
 CAMERAS = {
     "no focal length": ("cam_K", camera_values(0), "focal lengths 0 and 150 px"),
-    "negative focal length": ("cam_K", camera_values(-150), "focal lengths -150 and 150 px"),
     "NaN": ("cam_K", camera_values(math.nan), "NaN is not a number"),
     "rotated": ("cam_K", camera_values(below=3.0), "is not a camera matrix"),
     "principal point on the moon": ("cam_K", camera_values(u=1e9), "principal point outside any image"),
     "eight numbers": ("cam_K", camera_values()[:8], "cam_K has 8 numbers, not 9"),
     "a number for a list": ("cam_K", 150.0, "cam_K has 1 numbers, not 9"),
     "numbers as words": ("cam_K", ["150", *camera_values()[1:]], "cam_K contains '150', which is not a number"),
-    "scale zero": ("depth_scale", 0, "depth_scale is 0"),
     "scale huge": ("depth_scale", 1e30, "depth_scale is 1e+30"),
 }
 
 
 POSES = {
     "R of zeros": ("cam_R_m2c", [0] * 9, "not orthogonal or not of unit length"),
-    "R scaled": ("cam_R_m2c", [1.01, 0, 0, 0, 1.01, 0, 0, 0, 1.01], "not orthogonal or not of unit length"),
     "R mirrored": ("cam_R_m2c", [-1, 0, 0, 0, 1, 0, 0, 0, 1], "it is mirrored: its determinant is -1"),
     "R a quaternion": ("cam_R_m2c", [0, 0, 0, 1], "cam_R_m2c has 4 numbers, not 9"),
     "t beyond sight": ("cam_t_m2c", [0, 0, 1e12], "cam_t_m2c is 1e+12 mm"),
-    "id a fraction": ("obj_id", 1.5, "obj_id is 1.5"),
     "id a way out": ("obj_id", "../../1", "obj_id contains '../../1'"),
 }
 
@@ -152,7 +144,6 @@ TRUTHS = {
     "a list": ("[]", "its top level is not an object"),
     "half": ('{"0": [{"obj_id": 1', "is not a scene's JSON file"),
     "no UTF-8": (b'{"\xff": []}', "is not a scene's JSON file ('utf-8' codec"),
-    "deep lists": ('{"0": ' + "[" * 100_000 + "]" * 100_000 + "}", "nested too deep"),
     "an image twice": ('{"0": [], "0": []}', "key '0' appears twice"),
     "an image twice in other words": ('{"0": [], "00": []}', "image 0 occurs twice"),
     "a negative image": ('{"-1": []}', "its key '-1' is not an image number"),

@@ -63,8 +63,6 @@ def save(tiny, path, **changes):
     [
         ("offsets", lambda a: a[:-1], r"'offsets' is \d+, not \d+"),
         ("offsets", lambda a: a[::-1], "'offsets' do not match"),
-        ("points_m", lambda a: np.full_like(a, np.nan), "'points_m' contains NaN"),
-        ("T_camera_object_init", lambda a: a[:, :3], "'T_camera_object_init' is"),
         ("symmetric", lambda a: a.astype(str), "array 'symmetric' has type <U"),
     ],
 )

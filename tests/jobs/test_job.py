@@ -141,7 +141,6 @@ def test_the_provenance_of_a_scripts_outputs_names_data_and_parameters_but_not_c
 ASCII = {"PYTHONIOENCODING": "ascii"}
 C_LOCALE = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
 HELP = [sys.executable, "-m", "gpca", "--help"]
-LINE = "gpca None: stdout: "
 
 
 def gpca(arguments, redirection="", **variables):

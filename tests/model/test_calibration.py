@@ -108,7 +108,6 @@ def test_an_answer_says_whose_promise_it_is(explainer, pair):
     ("labels", "groups", "words"),
     [
         (["right"] * 4, None, "labels: are all right; label some that are right and some that are wrong"),
-        (["wrong", "pose"] * 2, None, "labels: are all wrong"),
         (["right", "bad", "", "pose"], None, "registration 1: has the label 'bad'; choose one of right, wrong, noise"),
         (["right", "wrong"], None, "labels: are not one for each of 4 registrations"),
         (["right", "wrong"] * 2, ["a", "b", "", "c"], "registration 2: has no group"),

@@ -16,9 +16,6 @@ from gpca.model.diagnosis import Diagnosis, Reenacted, state_probabilities
 from gpca.model.file import FEATURE_COUNT
 from gpca.reenactment.dataset import FEATURES, Reenactments, reenactment_features
 from gpca.reenactment.settings import ReenactmentSettings
-from gpca.rigid import exp
-
-SMALL_MOTION = exp(np.array([[0.05, -0.02, 0.03, 0.01, 0.02, -0.01]]))[0]
 
 
 @pytest.fixture(scope="module")

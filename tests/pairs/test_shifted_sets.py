@@ -1,9 +1,5 @@
-from dataclasses import replace
-
 import numpy as np
-import pytest
 
-from gpca.errors import InputError
 from gpca.pairs.shifted_sets import DISTANCES, TRAINED_ON, ShiftedSets
 
 
@@ -17,28 +13,6 @@ def sets(n=12):
     distance = random.random((6 * n, len(DISTANCES)))
     cup = np.full(6 * n, "cup")
     return ShiftedSets(names, split, np.tile(np.arange(n), 6), concept, cup, cup, h, distance)
-
-
-def test_a_file_gives_back_what_was_saved(tmp_path):
-    sets().save(tmp_path / "seed0.npz", ("tiny", 0))
-    loaded = ShiftedSets.load(tmp_path / "seed0.npz")
-    for name, array in sets().arrays.items():
-        assert np.array_equal(getattr(loaded, name), array)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"split": "valid"}, "the split 'valid', which is neither train nor test"),
-        ({"h": np.nan}, "array 'h' contains NaN"),
-    ],
-)
-def test_bad_files_are_one_line(tmp_path, change, message):
-    [(name, value)] = change.items()
-    array = getattr(sets(), name)
-    replace(sets(), **{name: np.full(array.shape, value)}).save(tmp_path / "seed0.npz", ("tiny", 0))
-    with pytest.raises(InputError, match=message):
-        ShiftedSets.load(tmp_path / "seed0.npz")
 
 
 def test_every_set_is_trained_on_one_that_is_trained_on_itself():

@@ -32,8 +32,6 @@ class Nearest:
 class Head(Nearest):
     """Knows what the head says; labels teach it nothing."""
 
-    trained_with_encoder = True
-
     def fit(self, registrations):
         pass
 

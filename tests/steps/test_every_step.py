@@ -2,8 +2,6 @@
 
 import re
 
-import pytest
-
 from gpca.__main__ import COMMANDS
 from gpca.declarations.registry import steps as declared
 from gpca.process.code_files import ROOT
@@ -52,16 +50,7 @@ def test_a_step_made_anew_gives_the_same_bytes(folder, made):
             assert (folder / path.name).read_bytes() == path.read_bytes(), path.name
 
 
-@pytest.mark.parametrize(
-    ("step", "changes", "message"),
-    [
-        ("objects", {"--data-dir": "nowhere"}, "gpca objects: nowhere: no such folder; correct data_dir in the config"),
-        ("registrations", {"--objects": "lost.npz"}, "gpca registrations: lost.npz: no such file; make it with"),
-        ("attribute", {"--explainer": "shapley"}, "gpca attribute: explainer 'shapley': unknown; choose one of"),
-    ],
-)
-def test_the_process_ends_with_status_2_and_that_line_alone(folder, step, changes, message):
-    done = run_apart(arguments(step, changes), folder)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert len(done.stderr.splitlines()) == 1
-    assert done.stderr.startswith(message)
+def test_the_process_ends_with_status_2_and_that_line_alone(folder):
+    done = run_apart(arguments("attribute", {"--explainer": "shapley"}), folder)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+    assert done.stderr.startswith("gpca attribute: explainer 'shapley': unknown; choose one of")

@@ -29,19 +29,6 @@ def seconds_of(outcomes, seed=0):
     return seconds, (0.9 * seconds).round(6)
 
 
-def test_outcomes_survive_the_file_and_give_the_same_bytes(tmp_path):
-    outcomes = made()
-    outcomes.save(tmp_path / "deep" / "a.npz", ("tiny", 0))
-    loaded = Outcomes.load(tmp_path / "deep" / "a.npz")
-    for name in COLUMNS:
-        assert getattr(loaded, name).dtype == getattr(outcomes, name).dtype
-        assert np.array_equal(getattr(loaded, name), getattr(outcomes, name))
-    loaded.save(tmp_path / "b.npz", ("tiny", 0))
-    made(seed=1).save(tmp_path / "c.npz", ("tiny", 0))
-    first, again, other = ((tmp_path / name).read_bytes() for name in ("deep/a.npz", "b.npz", "c.npz"))
-    assert first == again != other
-
-
 def test_the_table_has_a_column_for_every_condition(tmp_path):
     outcomes = made()
     outcomes.write_table(tmp_path / "seed0.csv", CONDITIONS)

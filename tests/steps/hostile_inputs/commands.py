@@ -12,10 +12,4 @@ COMMANDS = {
                         "registrations.npz", "--uncertainty", "uncertainty.npz", "--uncertainty-timings",
                         "conditions.csv", "--input-timings", "seconds.csv", "--predictions", "new.csv", "--timings",
                         "new_seconds.csv"],
-    "shifted.npz": ["learners", *COMMON, "--learners", "learner_nearest", "--seeds", 0, "--sets", "shifted.npz",
-                    "--out", "new.csv"],
-    "seconds.csv": ["attribute", *COMMON, "--explainer", "gpca", "--seeds", 0, "--registrations", "registrations.npz",
-                    "--embeddings", "embeddings.npz", "--input-timings", "seconds.csv", "--predictions", "new.csv",
-                    "--timings", "new_seconds.csv"],
 }  # fmt: skip
-COMMANDS["conditions.csv"] = COMMANDS["uncertainty.npz"]

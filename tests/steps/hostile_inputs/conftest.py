@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from gpca.io.arrays import save_arrays
-from gpca.pairs.shifted_sets import DISTANCES
 from gpca.uncertainty.designs import DESIGNS
 
 K = len(DESIGNS["removal"].conditions)
@@ -26,10 +25,6 @@ def made(objects, registrations, tmp_path_factory):
     outcomes = {"covariance": np.tile(np.eye(6), (n, K, 1, 1)), "uncertainty": random.normal(size=(n, K))}
     outcomes |= {"residual": np.ones((n, K)), "degenerate": np.zeros((n, K), bool), "icp_calls": np.ones((n, K), int)}
     save_arrays(folder / "uncertainty.npz", outcomes | of_samples, registrations.axes)
-    sets = {"set": np.full(n, "in_distribution"), "concept": registrations.concept, "h": embeddings["h"]}
-    sets |= {"object_name": registrations.object_name, "cluster": registrations.cluster}
-    sets |= {"distance": np.ones((n, len(DISTANCES)))}
-    save_arrays(folder / "shifted.npz", sets | of_samples, registrations.axes)
     lines = [f"{s},{split},0.5,0.5" for s, split in zip(registrations.sample, registrations.split, strict=True)]
     (folder / "seconds.csv").write_text("\n".join(["sample,split,seconds,icp_seconds", *lines, ""]))
     lines = [f"{s},{split},{k},0.5,0.5" for s, split in zip(*of_samples.values(), strict=True) for k in range(K)]

@@ -38,7 +38,6 @@ VALUES = {
     ("objects.npz", "one huge point", "span"): {"points_m": at(7, 0, value=1e9)},
     ("objects.npz", "all points equal", "span 0 m"): {"points_m": same},
     ("objects.npz", "complex points", "complex"): {"points_m": lambda p: p + 1j},
-    ("objects.npz", "points of dates", "type datetime"): {"points_m": lambda p: p.astype("datetime64[s]")},
     ("objects.npz", "points of half precision", "float16, not float32 or float64"): {
         "points_m": lambda p: p.astype(np.float16)
     },
@@ -56,7 +55,6 @@ VALUES = {
     },
     # of registrations
     ("registrations.npz", "clouds in millimetres", "'points'"): {"points": lambda p: p * 1e6},
-    ("registrations.npz", "huge targets", "target_points"): {"target_points": lambda p: p.astype(float) * 1e200},
     ("registrations.npz", "a fitness above 1", "fitness"): {"fitness": lambda f: f + 1.5},
     ("registrations.npz", "a negative RMSE", "inlier_rmse"): {"inlier_rmse": lambda r: r - 9},
     ("registrations.npz", "a mirrored pose", "T_target_source_icp"): {"T_target_source_icp": at(0, 0, value=-1.0)},
@@ -66,26 +64,14 @@ VALUES = {
     ("registrations.npz", "a negative sample", "sample"): {"sample": at(0, value=-1)},
     ("registrations.npz", "an object before the first", "object_index"): {"object_index": at(0, value=-1)},
     ("registrations.npz", "a negative severity", "severity_noise"): {"severity_noise": lambda s: s - 1},
-    ("registrations.npz", "an unknown split", "the split 'tset', which is neither"): {"split": at(3, value="tset")},
-    ("registrations.npz", "an object without a name", "a name that is empty"): {"object_name": at(3, value=" ")},
-    ("registrations.npz", "poses of long doubles", "type float128, not float32 or float64"): {
-        "T_target_source_icp": lambda T: T.astype(np.longdouble)
-    },
     # of embeddings
-    ("embeddings.npz", "half precision", "float16"): {"h": lambda h: h.astype(np.float16)},
     ("embeddings.npz", "bytes of another order", "type >f8"): {"h": lambda h: h.astype(">f8")},
     ("embeddings.npz", "huge numbers", "above 1e+15"): {"h": lambda h: h * 1e200},
-    ("embeddings.npz", "infinity", "infinity"): {"h": at(3, 3, value=np.inf)},
     ("embeddings.npz", "no samples", "no training"): {
         "h": lambda h: h[:0], "head_logits": lambda h: h[:0], "sample": lambda s: s[:0], "split": lambda s: s[:0],
     },
     # of outcomes
     ("uncertainty.npz", "other samples", "conditions.csv: its samples differ"): {"sample": lambda s: s + 1000},
-    ("uncertainty.npz", "other conditions", "conditions"): {
-        name: lambda a: a[:, :2] for name in ("covariance", "uncertainty", "residual", "degenerate", "icp_calls")
-    },
-    # of shifted sets
-    ("shifted.npz", "an unknown split", "the split 'tset', which is neither"): {"split": at(-1, value="tset")},
 }  # fmt: skip
 
 
