@@ -142,7 +142,6 @@ STEP_OPTIONS = {
         "--seed": 0, "--registrations": "registrations.npz", "--encoder": "weights.pt",
         "--embeddings": "embeddings.npz", "--retrained": "density", "--retrained-embeddings": "control.npz",
         "--others": "other", "--other-registrations": "other.npz", "--predictions": "controls.csv",
-        "--timings": "control_seconds.csv",
     },
     "exchange": COMMON | {
         "--settings": {

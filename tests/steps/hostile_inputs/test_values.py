@@ -67,9 +67,6 @@ VALUES = {
     # of embeddings
     ("embeddings.npz", "bytes of another order", "type >f8"): {"h": lambda h: h.astype(">f8")},
     ("embeddings.npz", "huge numbers", "above 1e+15"): {"h": lambda h: h * 1e200},
-    ("embeddings.npz", "no samples", "no training"): {
-        "h": lambda h: h[:0], "head_logits": lambda h: h[:0], "sample": lambda s: s[:0], "split": lambda s: s[:0],
-    },
     # of outcomes
     ("uncertainty.npz", "other samples", "conditions.csv: its samples differ"): {"sample": lambda s: s + 1000},
 }  # fmt: skip
