@@ -32,6 +32,8 @@ class Nearest:
 class Head(Nearest):
     """Knows what the head says; labels teach it nothing."""
 
+    trained_with_encoder = True
+
     def fit(self, registrations):
         pass
 
