@@ -79,12 +79,6 @@ def test_a_file_of_ours_that_does_not_say_of_what_it_is_has_to_be_made_anew(fold
     refused(folder, capsys, step, lambda folder: unlabelled(folder / name), {}, f"{name}: .*{fault}")
 
 
-def test_objects_of_a_users_own_program_need_not_say_of_which_source_they_are(folder):
-    unlabelled(folder / "objects.npz")
-    assert main(arguments("registrations", {"--registrations": "new.npz", "--timings": "new.csv"})) == 0
-    assert Registrations.load(folder / "new.npz").axes == ("tiny", 0)
-
-
 def test_every_file_of_arrays_and_weights_says_of_what_it_is(made):
     for path in made.glob("*.npz"):
         with np.load(path) as archive:
