@@ -247,7 +247,7 @@ class ObjectClouds(Container):
 
     @classmethod
     def load(cls, path: str | Path, source: str | None = None) -> ObjectClouds:  # type: ignore[override]
-        """Read an objects npz, of this source unless it names none."""
+        """Read an objects npz, of this source if one is given."""
         return super().load(path, (source, None) if source else None)
 
     def save(self, path: str | Path, source: str) -> None:  # type: ignore[override]
