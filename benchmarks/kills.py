@@ -5,8 +5,8 @@
 Each start is the same command. `kill -9` ends its whole process group after seconds that are drawn from 0 to --longest
 (by the seed; what the run is doing just then, chance decides); the last start runs to its end. A run that ends before
 it is killed is compared, removed and begun anew, so that there are as many kills as asked for. Compared are the bytes
-of all results but those that hold seconds, and what lies beside them and in Snakemake's temporary folders. Works in a
-folder of its own, which is removed if all is well. Status 1 if a start was refused, a byte differs or anything is left.
+of all results but those that hold seconds, and what lies beside them. Works in a folder of its own, which is removed if
+all is well. Status 1 if a start was refused, a byte differs or anything is left.
 The last line is a JSON object: kills, runs, files, differing, left.
 """
 
@@ -46,18 +46,16 @@ def main(arguments: list[str] | None = None) -> int:
     expected = results(undisturbed / "results/smoke")
     delays = random.Random(options.seed)
     kills, runs, differing, left = 0, 0, set[str](), set[str]()
-    temporary: set[str] = set()
     while True:
         delay_s = delays.uniform(0, options.longest) if kills < options.kills else None
         if not start(command, disturbed, delay_s):
             kills += 1
-            temporary |= temporary_folders(disturbed)
             print(f"kill {kills} after {delay_s:.1f} s", flush=True)
             continue
         runs += 1
         actual = results(disturbed / "results/smoke")
         differing |= {name for name in expected.keys() | actual.keys() if expected.get(name) != actual.get(name)}
-        left |= unfinished(disturbed) | {path for path in temporary if Path(path).exists()}
+        left |= unfinished(disturbed)
         print(f"run {runs} has ended; differing: {sorted(differing)}; left: {sorted(left)}", flush=True)
         if delay_s is None:
             break
@@ -112,12 +110,6 @@ def unfinished(folder: Path) -> set[str]:
         path for name in ("locks", "scripts", "incomplete", "shadow") for path in folder.glob(f".snakemake/{name}/*")
     }
     return {str(path) for path in halves | state}
-
-
-def temporary_folders(folder: Path) -> set[str]:
-    """Those that the Snakemakes of the folder have noted as theirs, elsewhere."""
-    noted = folder / ".snakemake/running"
-    return set(noted.read_text(encoding="utf-8").splitlines()) if noted.is_file() else set()
 
 
 if __name__ == "__main__":

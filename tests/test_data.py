@@ -5,13 +5,15 @@ import re
 from collections import defaultdict
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 
 from gpca.errors import InputError
+from gpca.frames import instances as reading
 from gpca.frames.dataset import Dataset, read_models
 from gpca.frames.initial_pose import InitialPoseSettings, read_bop_results
-from gpca.frames.instances import FARTHEST, points_on_model, read_instances
+from gpca.frames.instances import FARTHEST, read_instances
 from gpca.io.csv_file import read_csv
 from gpca.objects.bop import read_models_info
 from gpca.objects.canonical import (
@@ -104,16 +106,20 @@ def dataset(name, **changes):
 
 
 @pytest.mark.parametrize("name", INSTANCES)
-def test_every_frame_is_read_and_every_instance_lies_on_its_model(name):
+def test_every_frame_is_read_and_every_instance_lies_on_its_model(name, monkeypatch):
+    near = []
+    monkeypatch.setattr(
+        reading, "require_near", lambda _, distance_m, diameter_m: near.append((distance_m, diameter_m))
+    )
     of = dataset(name)
     frames = of.frames()
     models = read_models(of, frames)
     objects = sample_objects((model.surface for model in models.values()), name)
     instances = read_instances({name: (of, frames, models)}, objects, InitialPoseSettings("true_pose"))
     assert len(instances) == INSTANCES[name]
-    assert points_on_model(instances, objects).max() < 5e-3
-    distances = points_on_model(instances, objects) / objects.diameters_m[instances.object_index]
-    assert distances.max() < FARTHEST / 5
+    distances_m, diameters_m = np.transpose(near)
+    assert distances_m.max() < 5e-3
+    assert (distances_m / diameters_m).max() < FARTHEST / 5
     shown = {frame.scene for frame in frames if frame.color}
     tested = {scene for scene, place in read_scene_splits(SCENES, name).items() if place.role == "evaluation"}
     assert shown == tested

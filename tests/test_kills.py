@@ -24,15 +24,13 @@ def snakemake(monkeypatch, tmp_path):
     def start(command, folder, delay_s):
         state.delays.append(delay_s)
         ended = delay_s is None or state.ends.pop(0)
-        for name in ("results/smoke/metrics.csv", "results/smoke/timings.csv", ".snakemake/running", HALF):
+        for name in ("results/smoke/metrics.csv", "results/smoke/timings.csv", HALF):
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             (folder / name).write_text("made" if name.endswith("metrics.csv") else f"{tmp_path}/{len(state.delays)}")
         if ended:
             (folder / HALF).unlink()
             if folder.name == "killed":
                 state.spoil(folder)
-        else:
-            (tmp_path / str(len(state.delays))).mkdir()
         return ended
 
     monkeypatch.setattr(kills, "start", start)
@@ -42,22 +40,14 @@ def snakemake(monkeypatch, tmp_path):
 @pytest.fixture
 def run(tmp_path, snakemake, capsys):
     def run():
-        for path in tmp_path.glob("[0-9]*"):
-            path.rmdir()
         status = kills.main(["--kills", "3", "--longest", "9", "--folder", str(tmp_path / "work")])
         return status, json.loads(capsys.readouterr().out.splitlines()[-1])
 
     return run
 
 
-def cleared(folder):
-    """As the next start does with what killed ones have left elsewhere."""
-    for path in folder.parents[1].glob("[0-9]*"):
-        path.rmdir()
-
-
 def test_there_are_as_many_kills_as_asked_for_and_every_run_that_ends_is_compared(run, snakemake, tmp_path):
-    snakemake.ends, snakemake.spoil = [False, True, False, False], cleared
+    snakemake.ends, snakemake.spoil = [False, True, False, False], lambda folder: None
     status, found = run()
     assert (status, found) == (0, {"kills": 3, "runs": 2, "files": 1, "differing": 0, "left": 0})
     seeded = random.Random(0)
@@ -66,33 +56,25 @@ def test_there_are_as_many_kills_as_asked_for_and_every_run_that_ends_is_compare
 
 
 def byte(folder):
-    cleared(folder)
     (folder / "results/smoke/metrics.csv").write_text("mad3")
 
 
 def one_file_more(folder):
-    cleared(folder)
     (folder / "results/smoke/more.csv").touch()
 
 
 def half_a_file(folder):
-    cleared(folder)
     (folder / HALF).touch()
 
 
 def lock(folder):
-    cleared(folder)
-    (folder / ".snakemake/locks").mkdir()
+    (folder / ".snakemake/locks").mkdir(parents=True)
     (folder / ".snakemake/locks/0.input.lock").touch()
-
-
-def temporary_folders(folder):
-    pass
 
 
 @pytest.mark.parametrize(
     ("spoil", "differing", "left"),
-    [(byte, 1, 0), (one_file_more, 1, 0), (half_a_file, 1, 1), (lock, 0, 1), (temporary_folders, 0, 3)],
+    [(byte, 1, 0), (one_file_more, 1, 0), (half_a_file, 1, 1), (lock, 0, 1)],
 )
 def test_what_differs_or_is_left_is_counted_and_kept_to_be_looked_at(run, snakemake, tmp_path, spoil, differing, left):
     snakemake.ends, snakemake.spoil = [False] * 3, spoil

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.kills import results, temporary_folders
+from benchmarks.kills import results
 from gpca.process.code_files import FOLDER
 
 from . import forks
@@ -230,13 +230,11 @@ class Continued:
 
     Attributes:
         locks: how many of Snakemake's locks the killed run left.
-        temporary: the folders elsewhere that it left.
         second: what the same command said while the first was living.
     """
 
     project: Project
     locks: int
-    temporary: set[str]
     second: subprocess.CompletedProcess
 
 
@@ -259,7 +257,6 @@ def _killed_and_continued(smoke, folder):
     os.killpg(process.pid, signal.SIGKILL)
     assert process.wait() != 0
     assert not list(project.folder.glob("results/smoke/predictions/**/*.csv"))
-    temporary = {path for path in temporary_folders(project.folder) if Path(path).exists()}
     locks = len(list(project.folder.glob(".snakemake/locks/*")))
     project.snakemake(*run)
-    return Continued(project, locks, temporary, second)
+    return Continued(project, locks, second)

@@ -60,7 +60,7 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
         "predictions/ycb/gpca/ predictions/real_rgbd/gpca_pair diagnoses/ycb/gpca active_learning/ycb kernels/ "
         "learners/ model.pt recovery/ controls/ exchange/ table2_per_concept fig4_pipeline",
         "registrations encoders/ embeddings/ uncertainty/ methods/ estimates/ descriptors/ shifted/ residuals_forest "
-        "predictions/ycb/shap_additive predictions/ycb/softmax_head diagnoses/ycb/gate_rmse fig3_concepts",
+        "predictions/ycb/shap_additive diagnoses/ycb/gate_rmse fig3_concepts",
     ),
     "gpca/steps/shift.py": ("shifted/ learners/ table5_shift", "predictions active_learning diagnoses/ model.pt"),
     "gpca/experiments/kernel_grid.py": (
@@ -77,7 +77,7 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
     ),
     "baselines/aligned_source.py": (
         "predictions/ycb/softmax_head recovery/ controls/",
-        "predictions/ycb/gpca predictions/ycb/shap_additive learners embeddings model.pt gate_rmse",
+        "predictions/ycb/gpca/ predictions/ycb/shap_additive learners embeddings model.pt gate_rmse",
     ),
     "gpca/frames/synthesis.py": ("poses/ embeddings/real_rgbd model.pt", "scenes instances predictions/ycb causes/"),
     "gpca/causes/policy.py": ("model.pt runtime.csv recovery/ table8_recovery", "predictions encoders diagnoses/"),
