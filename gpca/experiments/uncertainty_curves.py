@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from gpca.attribution.diagnostics import BINS
 from gpca.attribution.learner_predictions import read_learner_predictions, sets_of, wrong
@@ -76,6 +75,8 @@ def coverage_risk(run: Run, learned: Mapping) -> Figure:
     learned=(read_learner_predictions, PREDICTIONS),
 )
 def reliability(run: Run, learned: Mapping) -> Figure:
+    import pandas as pd
+
     shown, columns = _shown(run, learned)
     drawing, axes = _panels(len(shown), columns, 0.7 + 1.3 * len(shown), "largest score")
     for row, learner in zip(axes, shown, strict=True):

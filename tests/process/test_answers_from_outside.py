@@ -48,7 +48,7 @@ def test_a_strategy_returns_rows_of_the_pool(monkeypatch, rows, words):
 def test_a_policy_returns_a_decision_that_can_be_taken(decision, words):
     loop = SimpleNamespace(actions=("denoise",), means=SimpleNamespace(policy=SimpleNamespace(treatments=TREATMENTS)))
     with pytest.raises(InputError, match=f"recovery policy 'mine'.*{words}"):
-        Loop._decision(loop, "mine", lambda _: decision, None)
+        Loop._decision(loop, "mine", SimpleNamespace(decide=lambda *_: decision), None)
 
 
 @pytest.mark.parametrize(

@@ -11,9 +11,9 @@ def one_object(folder):
     with np.load(folder / "objects.npz") as archive:
         arrays = dict(archive)
     rows = slice(0, arrays["offsets"][1])
-    chosen = {name: arrays[name][:1] for name in ("names", "diameters_m")}
+    chosen = {name: arrays[name][:1] for name in ("names", "diameters_m", "families", "folds")}
     chosen |= {name: arrays[name][rows] for name in ("points_m", "normals")} | {"offsets": arrays["offsets"][:2]}
-    np.savez(folder / "objects.npz", **chosen)
+    np.savez(folder / "objects.npz", **arrays | chosen)
 
 
 def nan(array):

@@ -105,5 +105,5 @@ def test_what_was_perturbed_is_hidden_from_all_but_the_oracle(registrations, mon
     told = given.concept[0] in CONCEPTS and np.isfinite(given.severity_noise[0])
     assert told == (design == "oracle") == DESIGNS[design].oracle
     if told:
-        with pytest.raises(InputError, match="knob 'noise': nan"):
+        with pytest.raises(InputError, match="contains NaN"):
             evaluate(design, registrations.without_labels(), registrations.rows("test")[:1])
