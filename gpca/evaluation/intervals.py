@@ -27,10 +27,10 @@ FEWEST_CLUSTERS = 5  # below which no difference is shown
 FEWEST_FAILURES = 30  # or other samples of a kind, below which nothing is concluded
 NO_WIDTH = 1e-9  # an interval this narrow differs from a point by rounding alone
 ANYTHING = (-np.inf, np.inf)  # limits of a value that has none
+GUESSES = ("chance", "most_frequent")
+WITHOUT_TRAINING = (*GUESSES, "rule")
 TRIVIAL = (
-    "chance",
-    "most_frequent",
-    "rule",
+    *WITHOUT_TRAINING,
     "rule_fitted",
     "tree_trivial",
     "logistic_trivial",

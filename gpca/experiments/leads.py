@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping
 
 from gpca.causes.judged import CEILING
-from gpca.evaluation.intervals import FEWEST_CLUSTERS, FEWEST_FAILURES, TRIVIAL
+from gpca.evaluation.intervals import FEWEST_CLUSTERS, FEWEST_FAILURES, WITHOUT_TRAINING
 from gpca.evaluation.measures import POOLED
 from gpca.explainers.registry import CAUSES, explainers
 from gpca.io.frame import Frame
@@ -17,7 +17,7 @@ JUDGED = "reenact"
 def trained(name: str) -> bool:
     """Whether an explainer learns and reads no re-enactment: a rival of what needs no training."""
     entry = explainers(CAUSES).get(name)
-    return entry is not None and name not in TRIVIAL[:3] and "reenactment" not in entry.sees
+    return entry is not None and name not in WITHOUT_TRAINING and "reenactment" not in entry.sees
 
 
 def trained_rivals(name: str, names: Collection[str]) -> Collection[str]:

@@ -16,7 +16,7 @@ from gpca.causes.settings import Calls
 from gpca.declarations import Experiment, Frame, LeftOut, Names, Paths, Plan, Run, Step, Wildcards, numbers, table
 from gpca.encoders.registry import encoder_module
 from gpca.errors import InputError, with_key
-from gpca.evaluation.intervals import ANYTHING, REPEATS, TRIVIAL, Clustered
+from gpca.evaluation.intervals import ANYTHING, GUESSES, REPEATS, Clustered
 from gpca.evaluation.measures import POOLED, compared, intervals
 from gpca.experiments.cause_tables import AGAIN, SECTION, SHOWN
 from gpca.experiments.diagnosis import CAUSES_FILES, FURTHER, TABLE, cause_titles
@@ -220,7 +220,7 @@ def reached(measures: Frame, titles: Mapping[str, str], explainers: Mapping[str,
 
 def knows(name: str) -> str:
     """What an explainer knows of the generator that the samples of Table IX are drawn by."""
-    if name in TRIVIAL[:2]:
+    if name in GUESSES:
         return "nothing"
     if name == "rule":
         return "its limits"
