@@ -21,15 +21,10 @@ LeftOut = Callable[[str], set[str]]  # key of a mapping of the config -> names t
 
 @dataclass(frozen=True)
 class Names:
-    """The names that a mapping of the config may have.
+    """The names that a mapping of the config may have."""
 
-    Attributes:
-        noun: the word for a thing with such a name.
-        known: returns all of them; None where any name may stand.
-    """
-
-    noun: str
-    known: Callable[[], Collection[str]] | None = None
+    noun: str  # the word for a thing with such a name
+    known: Callable[[], Collection[str]] | None = None  # returns all of them; None where any name may stand
 
 
 EXPLAINERS = Names("explainer", explainers)
@@ -37,23 +32,14 @@ EXPLAINERS = Names("explainer", explainers)
 
 @dataclass(frozen=True)
 class Tidy:
-    """A file of tidy numbers; a file with a collector is made from other files of the run by a rule of its own.
+    """A file of tidy numbers; a file with a collector is made from other files of the run by a rule of its own."""
 
-    Attributes:
-        file: its name.
-        collector: ``module:function`` that returns its rows; empty where another rule of the experiment writes it.
-        files: the collector's arguments -> patterns of files below the folder of a run, with names in braces.
-        rule: name of the rule, if it is not that of the file.
-        others: files that the collector returns besides, each a target of its own.
-        takes_run: the collector's first argument is the run.
-    """
-
-    file: str
-    collector: str = ""
-    files: Mapping[str, str] = field(default_factory=dict)
-    rule: str = ""
-    others: tuple[str, ...] = ()
-    takes_run: bool = False
+    file: str  # its name
+    collector: str = ""  # ``module:function`` that returns its rows; empty where another rule writes it
+    files: Mapping[str, str] = field(default_factory=dict)  # the collector's arguments -> patterns of files
+    rule: str = ""  # name of the rule, if it is not that of the file
+    others: tuple[str, ...] = ()  # files that the collector returns besides, each a target of its own
+    takes_run: bool = False  # the collector's first argument is the run
 
     @property
     def all_files(self) -> tuple[str, ...]:
@@ -72,34 +58,22 @@ class Tidy:
 
 @dataclass(frozen=True, kw_only=True)
 class Experiment:
-    """The declaration of an experiment. Keys of the config are paths with dots, such as ``real_world.backbones``.
+    """The declaration of an experiment. Keys of the config are paths with dots, such as ``real_world.backbones``."""
 
-    Attributes:
-        name: of its module, and of its file of rules, if it has one.
-        beside: modules of :mod:`gpca.experiments` that declare further results, numbers and steps of it.
-        sections: its sections of the config -> their types; every key has to be given.
-        tidy: its files of numbers, which every run makes that has the experiment.
-        needs: names that must not be empty, or a run does without it.
-        names: what it adds to the names in the braces of paths (:func:`gpca.experiments.run.names_of`).
-        check: refuses, with an InputError, sections that their types allow and that no run can use.
-        optional_entries: keys of mappings of which any entry may be false -> names that they have.
-        switches: keys of mappings name -> true or false, which are read as the list of the names that are true.
-        lists: keys of lists and mappings -> the key of the mapping that has their names, of which they lose those that
-            the config leaves out; or a function that returns the names that they lose.
-        notices: lines on stderr when a run with this config begins.
-    """
-
-    name: str
-    beside: tuple[str, ...] = ()
-    sections: Mapping[str, Any] = field(default_factory=dict)
-    tidy: tuple[Tidy, ...] = ()
-    needs: tuple[str, ...] = ()
-    names: ByRun = lambda config, sources: {}
+    name: str  # of its module, and of its file of rules, if it has one
+    beside: tuple[str, ...] = ()  # modules of gpca.experiments that declare further results, numbers and steps of it
+    sections: Mapping[str, Any] = field(default_factory=dict)  # of the config -> their types; every key has to be given
+    tidy: tuple[Tidy, ...] = ()  # its files of numbers, which every run makes that has the experiment
+    needs: tuple[str, ...] = ()  # names that must not be empty, or a run does without it
+    names: ByRun = lambda config, sources: {}  # what it adds to those of :func:`gpca.experiments.run.names_of`
+    # Refuses, with an InputError, sections that their types allow and that no run can use.
     check: Callable[[dict, LeftOut], None] = lambda config, left_out: None
-    optional_entries: Mapping[str, Names] = field(default_factory=dict)
-    switches: Mapping[str, Names] = field(default_factory=dict)
+    optional_entries: Mapping[str, Names] = field(default_factory=dict)  # mappings of which any entry may be false
+    switches: Mapping[str, Names] = field(default_factory=dict)  # mappings name -> bool, read as the list of true names
+    # Lists and mappings -> the mapping that has their names, of which they lose those that the config leaves out; or a
+    # function that returns the names that they lose.
     lists: Mapping[str, str | Callable[[LeftOut], Collection[str]]] = field(default_factory=dict)
-    notices: Callable[[Mapping[str, Any]], Iterable[str]] = lambda config: ()
+    notices: Callable[[Mapping[str, Any]], Iterable[str]] = lambda config: ()  # on stderr when a run begins
 
     @property
     def has_rules(self) -> bool:

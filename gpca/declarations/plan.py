@@ -18,18 +18,13 @@ READ = "config_read"  # in the provenance of a result
 
 
 class Run:
-    """A run.
-
-    Args:
-        config: that :func:`gpca.config.check.check` has checked.
-        only: name of a section -> the entries of it that are shown, by all that ask for the section.
-        names_of: function of config and sources that returns the names in the braces of paths.
-    """
+    """A run, of a config that :func:`gpca.config.check.check` has checked."""
 
     def __init__(
         self,
         config: Mapping[str, Any],
-        only: Mapping[str, Iterable[str]] | None = None,
+        only: Mapping[str, Iterable[str]] | None = None,  # section -> entries of it that are shown
+        # Function of config and sources that returns the names in the braces of paths.
         names_of: Callable[[Mapping, Mapping], dict[str, Any]] = lambda config, sources: {},
     ) -> None:
         self.config = config

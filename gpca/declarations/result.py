@@ -53,10 +53,8 @@ def figure(section: str, title: str, caption: str, **options: Any) -> Callable[[
 def numbers(*names: str, rule: str = "", **files: str) -> Callable[[Function], Function]:
     """Declare the function that returns the frames of these CSV files, in their order, or the one frame.
 
-    Args:
-        names: of the files. Each is a target without its suffix.
-        rule: name of the rule; that of the first file if empty.
-        files: the function's arguments -> patterns of the files that it reads.
+    Each name is a target without its suffix, and the first one the rule's unless it has another; `files` are the
+    function's arguments -> patterns of the files that it reads.
     """
 
     def declare(function: Function) -> Function:
@@ -84,8 +82,7 @@ def _declared(
     given = []
     for argument, of in inputs.items():
         if isinstance(of, str):
-            is_numbers = of.endswith(".csv") and "{" not in of
-            given.append(Input(argument, (of,), READ_ROWS if is_numbers else ""))
+            given.append(Input(argument, (of,), READ_ROWS if of.endswith(".csv") and "{" not in of else ""))
         else:
             read, files = of[0], (of[1],) if isinstance(of[1], str) else tuple(of[1])
             given.append(Input(argument, files, f"{read.__module__}:{read.__name__}"))

@@ -50,37 +50,23 @@ class Plan:
 
 @dataclass(frozen=True, kw_only=True)
 class Step:
-    """The declaration of a step.
+    """The declaration of a step; functions get the plan and the wildcards of a job."""
 
-    Attributes:
-        name: of its rule.
-        run: ``module:function``, or a module with a function ``run``, that gets the job.
-        inputs, outputs: argument of the job -> patterns of files below the folder of a run; an input may be a function
-            of plan and wildcards.
-        data: function of plan and wildcards that returns files from outside the run, which the job gets as ``data``.
-        settings: keys of the config, with dots, that the job is given by these names; or a function that returns them.
-        params: further arguments of the job, or functions of plan and wildcards that return them.
-        modules: returns the modules chosen at run time, by plan, which count as code of the step.
-        modules_of_job: returns those that a job chooses, by plan and wildcards.
-        where: wildcard, or name behind an asterisk -> the name of its values, if another.
-        target: name of the rule that asks for all outputs, if there is one.
-        when: tells whether a run has the step.
-        priority, threads, resources: of its jobs.
-    """
-
-    name: str
-    run: str
-    outputs: Mapping[str, str | Sequence[str]]
-    inputs: Mapping[str, Files] = field(default_factory=dict)
+    name: str  # of its rule
+    run: str  # ``module:function``, or a module with a function ``run``, that gets the job
+    outputs: Mapping[str, str | Sequence[str]]  # argument of the job -> patterns of files below the folder of a run
+    inputs: Mapping[str, Files] = field(default_factory=dict)  # likewise, or functions that return patterns
+    # Files from outside the run, which the job gets as ``data``.
     data: Callable[[Plan, Wildcards], Iterable[str | Path]] | None = None
-    settings: Settings = ()
-    params: Mapping[str, Any] = field(default_factory=dict)
+    settings: Settings = ()  # keys of the config, with dots, that the job is given by these names; or a function
+    params: Mapping[str, Any] = field(default_factory=dict)  # further arguments of the job, or functions
+    # Modules chosen at run time, which count as code of the step: those of all jobs, and those that a job chooses.
     modules: Callable[[Plan], Iterable[str]] = lambda plan: ()
     modules_of_job: Callable[[Plan, Wildcards], Iterable[str]] | None = None
-    where: Mapping[str, str] = field(default_factory=dict)
-    target: str = ""
-    when: Callable[[Plan], bool] = lambda plan: True
-    priority: int = 0
+    where: Mapping[str, str] = field(default_factory=dict)  # wildcard or listed name -> name of its values, if another
+    target: str = ""  # name of the rule that asks for all outputs, if there is one
+    when: Callable[[Plan], bool] = lambda plan: True  # whether a run has the step
+    priority: int = 0  # of its jobs, as all that follows
     threads: int = 1
     resources: Mapping[str, Any] = field(default_factory=dict)
 
