@@ -15,6 +15,7 @@ import torch
 from torch import nn
 
 from gpca.encoders import edge_kernels
+from gpca.encoders.groups import take
 from gpca.encoders.inference import NEGATIVE_SLOPE, WIDTHS, embed_clouds, nearest
 from gpca.encoders.layers import BatchNorm, PointLinear, linear
 
@@ -147,11 +148,9 @@ class _EdgeMax(torch.autograd.Function):
 def _edge_max_plain(ac_B_N_2F: torch.Tensor, neighbors_B_N_k: torch.Tensor, norm: nn.BatchNorm1d) -> torch.Tensor:
     """Evaluate the layer with torch operations, on a GPU or of a trained layer."""
     a_B_N_F, c_B_N_F = ac_B_N_2F.chunk(2, dim=-1)
-    batch, n, k = neighbors_B_N_k.shape
-    rows = (neighbors_B_N_k + n * torch.arange(batch, device=ac_B_N_2F.device)[:, None, None]).reshape(-1)
-    y_E_F = a_B_N_F.reshape(batch * n, -1)[rows] + c_B_N_F.reshape(batch * n, 1, -1).expand(-1, k, -1).flatten(0, 1)
-    activated = nn.functional.leaky_relu(norm(y_E_F), NEGATIVE_SLOPE)
-    return activated.view(batch, n, k, -1).amax(dim=2)
+    y_B_N_k_F = take(a_B_N_F, neighbors_B_N_k) + c_B_N_F[:, :, None]
+    activated_E_F = nn.functional.leaky_relu(norm(y_B_N_k_F.flatten(0, 2)), NEGATIVE_SLOPE)
+    return activated_E_F.view_as(y_B_N_k_F).amax(dim=2)
 
 
 def _numpy(*tensors: torch.Tensor):

@@ -121,8 +121,7 @@ def gather_extreme_and_sums(ac: np.ndarray, neighbors: np.ndarray, gamma: np.nda
 def _gather_extreme_and_sums(ac, neighbors, sign, extreme, extreme_at, edge_sums, mean, variance):
     batch, n, k = neighbors.shape
     features = len(sign)
-    sums = np.zeros((batch, features), np.float64)
-    squares = np.zeros((batch, features), np.float64)
+    sums, squares = np.zeros((batch, features)), np.zeros((batch, features))
     for b in prange(batch):
         square = np.empty(features, ac.dtype)
         for i in range(n):
@@ -232,8 +231,7 @@ def _edge_max_backward(
     dtype = ac.dtype
     slope = dtype.type(slope)
     grad = np.empty((batch, n, features), dtype)
-    gamma_parts = np.zeros((batch, features), np.float64)
-    beta_parts = np.zeros((batch, features), np.float64)
+    gamma_parts, beta_parts = np.zeros((batch, features)), np.zeros((batch, features))
     for b in prange(batch):
         for i in range(n):
             for f in range(features):
@@ -252,8 +250,7 @@ def _edge_max_backward(
         constant[f] = dtype.type(scale[f] * grad_beta[f] / n_edges) - linear[f] * mean[f]
     for b in prange(batch):
         degree = np.zeros(n, np.int32)
-        arriving_c = np.zeros((n, features), dtype)
-        selected = np.zeros((n, features), dtype)
+        arriving_c, selected = np.zeros((n, features), dtype), np.zeros((n, features), dtype)
         for i in range(n):
             c = ac[b, i, features:]
             for slot in range(k):
@@ -265,8 +262,7 @@ def _edge_max_backward(
             for f in range(features):
                 selected[extreme_at[b, i, f], f] += grad[b, i, f]
         for i in range(n):
-            arrivals = dtype.type(degree[i])
-            leaving = dtype.type(k)
+            arrivals, leaving = dtype.type(degree[i]), dtype.type(k)
             for f in range(features):
                 arriving_y = arrivals * ac[b, i, f] + arriving_c[i, f]
                 grad_ac[b, i, f] = scale[f] * selected[i, f] - arrivals * constant[f] - linear[f] * arriving_y

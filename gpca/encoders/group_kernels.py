@@ -113,12 +113,10 @@ def moments(y, weight, cloud_ends):
     """Return mean and biased variance (F,), float64, of the rows of y (E, F), each counted `weight` times."""
     features = y.shape[1]
     batch = len(cloud_ends) - 1
-    sums = np.zeros((batch, features), np.float64)
-    squares = np.zeros((batch, features), np.float64)
+    sums, squares = np.zeros((batch, features)), np.zeros((batch, features))
     for b in prange(batch):
         for start in range(cloud_ends[b], cloud_ends[b + 1], _BLOCK):
-            total = np.zeros(features, y.dtype)
-            square = np.zeros(features, y.dtype)
+            total, square = np.zeros(features, y.dtype), np.zeros(features, y.dtype)
             for e in range(start, min(start + _BLOCK, cloud_ends[b + 1])):
                 w = weight[e]
                 for f in range(features):
@@ -127,11 +125,8 @@ def moments(y, weight, cloud_ends):
             for f in range(features):
                 sums[b, f] += total[f]
                 squares[b, f] += square[f]
-    weights = np.float64(0)
-    for e in range(len(weight)):
-        weights += weight[e]
-    mean = np.zeros(features, np.float64)
-    variance = np.zeros(features, np.float64)
+    weights = weight.astype(np.float64).sum()
+    mean, variance = np.zeros(features), np.zeros(features)
     for b in range(batch):
         mean += sums[b] / weights
         variance += squares[b] / weights
@@ -184,13 +179,11 @@ def normalize_backward(grad_out, out, y, weight, mean, inverse_std, gamma, cloud
     """
     features = y.shape[1]
     batch = len(cloud_ends) - 1
-    gamma_parts = np.zeros((batch, features), np.float64)
-    beta_parts = np.zeros((batch, features), np.float64)
+    gamma_parts, beta_parts = np.zeros((batch, features)), np.zeros((batch, features))
     zero = y.dtype.type(0)
     for b in prange(batch):
         for start in range(cloud_ends[b], cloud_ends[b + 1], _BLOCK):
-            total = np.zeros(features, y.dtype)
-            product = np.zeros(features, y.dtype)
+            total, product = np.zeros(features, y.dtype), np.zeros(features, y.dtype)
             for e in range(start, min(start + _BLOCK, cloud_ends[b + 1])):
                 for f in range(features):
                     g = grad_out[e, f] if out[e, f] > zero else zero
@@ -199,8 +192,7 @@ def normalize_backward(grad_out, out, y, weight, mean, inverse_std, gamma, cloud
             for f in range(features):
                 beta_parts[b, f] += total[f]
                 gamma_parts[b, f] += product[f] * inverse_std[f]
-    grad_gamma, grad_beta = _added(gamma_parts), _added(beta_parts)
-    scale, constant, linear = _affine(grad_gamma, grad_beta, weight, mean, inverse_std, gamma)
+    grad_gamma, grad_beta, scale, constant, linear = _affine(gamma_parts, beta_parts, weight, mean, inverse_std, gamma)
     grad_y = np.empty_like(y)
     for b in prange(batch):
         for e in range(cloud_ends[b], cloud_ends[b + 1]):
@@ -217,15 +209,13 @@ def normalize_max_backward(grad_out, at, y, weight, mean, inverse_std, gamma, cl
     features = y.shape[1]
     batch = len(cloud_ends) - 1
     groups = len(at) // batch
-    gamma_parts = np.zeros((batch, features), np.float64)
-    beta_parts = np.zeros((batch, features), np.float64)
+    gamma_parts, beta_parts = np.zeros((batch, features)), np.zeros((batch, features))
     for b in prange(batch):
         for g in range(b * groups, (b + 1) * groups):
             for f in range(features):
                 beta_parts[b, f] += grad_out[g, f]
                 gamma_parts[b, f] += grad_out[g, f] * ((y[at[g, f], f] - mean[f]) * inverse_std[f])
-    grad_gamma, grad_beta = _added(gamma_parts), _added(beta_parts)
-    scale, constant, linear = _affine(grad_gamma, grad_beta, weight, mean, inverse_std, gamma)
+    grad_gamma, grad_beta, scale, constant, linear = _affine(gamma_parts, beta_parts, weight, mean, inverse_std, gamma)
     grad_y = np.empty_like(y)
     for b in prange(batch):
         for e in range(cloud_ends[b], cloud_ends[b + 1]):
@@ -238,21 +228,11 @@ def normalize_max_backward(grad_out, at, y, weight, mean, inverse_std, gamma, cl
     return grad_y, grad_gamma.astype(y.dtype), grad_beta.astype(y.dtype)
 
 
-@njit(cache=True)
-def _added(parts):
-    total = np.zeros(parts.shape[1], np.float64)
-    for b in range(len(parts)):
-        total += parts[b]
-    return total
-
-
 @njit(cache=True, error_model="numpy")
-def _affine(grad_gamma, grad_beta, weight, mean, inverse_std, gamma):
-    """Return scale, constant, linear of the gradient scale g_e - w_e (constant + linear y_e)."""
-    weights = np.float64(0)
-    for e in range(len(weight)):
-        weights += weight[e]
+def _affine(gamma_parts, beta_parts, weight, mean, inverse_std, gamma):
+    """Return the added parts, and scale, constant, linear of the gradient scale g_e - w_e (constant + linear y_e)."""
+    grad_gamma, grad_beta, weights = gamma_parts.sum(axis=0), beta_parts.sum(axis=0), weight.astype(np.float64).sum()
     scale = gamma * inverse_std
     linear = scale * inverse_std * grad_gamma / weights
     constant = scale * grad_beta / weights - linear * mean
-    return scale, constant.astype(gamma.dtype), linear.astype(gamma.dtype)
+    return grad_gamma, grad_beta, scale, constant.astype(gamma.dtype), linear.astype(gamma.dtype)

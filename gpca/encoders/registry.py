@@ -21,7 +21,6 @@ OF_ANY_SIZE = ("dgcnn",)  # backbones that take clouds of different sizes in one
 
 
 def encoders() -> dict[str, str]:
-    """Return ``module:class`` of every encoder by name, including those from outside."""
     return joined_outside("ENCODERS", "backbone", str, ENCODERS)
 
 
@@ -58,7 +57,6 @@ def make_encoder(backbone: str, options: dict):
 
 
 def parameter_count(module) -> int:
-    """Return the number of trained values of a torch module."""
     return sum(parameter.numel() for parameter in module.parameters() if parameter.requires_grad)
 
 

@@ -1,7 +1,6 @@
 """Training an encoder with a head over the concepts (paper Sec. III-A), its files, and the embeddings."""
 
 import hashlib
-from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from copy import deepcopy
 from dataclasses import asdict
@@ -39,20 +38,17 @@ def draw_points(
         points = registrations.cloud(row)
         random = generator(*axes, registrations.split[row], registrations.sample[row])
         count = n_points if fewest is None else min(int(random.integers(fewest, n_points + 1)), len(points))
-        clouds.append(points[random.choice(len(points), count, replace=len(points) < count, shuffle=False)])
-    if fewest is not None:
-        return [torch.from_numpy(cloud.astype(np.float32)) for cloud in clouds]
-    return torch.from_numpy(np.stack(clouds).astype(np.float32))
+        chosen = random.choice(len(points), count, replace=len(points) < count, shuffle=False)
+        clouds.append(torch.from_numpy(points[chosen].astype(np.float32)))
+    return torch.stack(clouds) if fewest is None else clouds
 
 
-class Classifier(nn.Sequential):
+class Classifier(nn.Module):
     """An encoder and a head over the classes."""
 
-    encoder: nn.Module
-    head: nn.Module
-
     def __init__(self, encoder: nn.Module, head: nn.Module) -> None:
-        super().__init__(OrderedDict(encoder=encoder, head=head))
+        super().__init__()
+        self.encoder, self.head = encoder, head
 
     def forward(self, clouds: Any) -> torch.Tensor:
         return self.head(embeddings_by(self.encoder, clouds))
@@ -167,9 +163,9 @@ class _Training:
             correct += float((outputs_B_C.argmax(dim=1) == targets_B).sum())
         if not np.isfinite(loss_sum):
             raise InputError(self.title, f"the loss is not finite in epoch {epoch + 1}", "lower encoder.learning_rate")
-        means = {"loss": loss_sum / len(self._rows), "accuracy": correct / len(self._rows)}
         self._schedule((epoch + 1) * self._batches)
-        return {"learning_rate": self._optimizer.learning_rate, **means}
+        n, rate = len(self._rows), self._optimizer.learning_rate
+        return {"learning_rate": rate, "loss": loss_sum / n, "accuracy": correct / n}
 
     def _schedule(self, step: int) -> None:
         steps = max(5, self._settings.epochs * self._batches)  # a quarter of 4 would be one, a rise of no length
