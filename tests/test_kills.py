@@ -73,8 +73,7 @@ def lock(folder):
 
 
 @pytest.mark.parametrize(
-    ("spoil", "differing", "left"),
-    [(byte, 1, 0), (one_file_more, 1, 0), (half_a_file, 1, 1), (lock, 0, 1)],
+    ("spoil", "differing", "left"), [(byte, 1, 0), (one_file_more, 1, 0), (half_a_file, 1, 1), (lock, 0, 1)]
 )
 def test_what_differs_or_is_left_is_counted_and_kept_to_be_looked_at(run, snakemake, tmp_path, spoil, differing, left):
     snakemake.ends, snakemake.spoil = [False] * 3, spoil

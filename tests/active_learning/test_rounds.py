@@ -7,13 +7,7 @@ import numpy as np
 import pytest
 
 import gpca.active_learning.rounds
-from gpca.active_learning.rounds import (
-    Samples,
-    initial_gpc,
-    make_task,
-    rounds,
-    step_of,
-)
+from gpca.active_learning.rounds import Samples, initial_gpc, make_task, rounds, step_of
 from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.classifier.settings import GPCSettings
 from gpca.pairs.perturbation import CONCEPTS

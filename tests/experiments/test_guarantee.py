@@ -10,27 +10,14 @@ from gpca.evaluation.measures import ALL, POOLED
 from gpca.experiments.guarantee import COLUMNS, collect, read_guarantee, table19_guarantee, table19_shift
 from gpca.explainers.registry import CAUSES, explainer_entry
 from gpca.guarantee import answers as asked
-from gpca.guarantee.answers import (
-    BY_FAMILY,
-    BY_SAMPLE,
-    COVERAGE,
-    FALSE_ALARMS,
-    FAMILIES,
-    MISSED,
-    PLAIN,
-    SIZE,
-    UNSURE,
-)
+from gpca.guarantee.answers import BY_FAMILY, BY_SAMPLE, COVERAGE, FALSE_ALARMS, FAMILIES, MISSED, PLAIN, SIZE, UNSURE
 from gpca.guarantee.guarantee import STATES
 from gpca.io.csv_file import write_csv
 from gpca.reporting.tables.cells import rows_where
 from tests.config.configs import changed
 from tests.guarantee.scored import scored_samples
 
-SECTION = {
-    **{"level": 0.8, "missed": 0.05, "false_alarms": 0.05, "family_risk": 0.2},
-    **{"explainers": ["reenact"]},
-}
+SECTION = {**{"level": 0.8, "missed": 0.05, "false_alarms": 0.05, "family_risk": 0.2}, **{"explainers": ["reenact"]}}
 PROMISED = {name: value for name, value in SECTION.items() if name != "explainers"}
 SOURCES = {
     "tools": {"title": "Tools", "kind": "procedural", "stand_in": False},

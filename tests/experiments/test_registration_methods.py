@@ -10,11 +10,7 @@ from gpca.errors import InputError
 from gpca.evaluation.intervals import wilson_interval
 from gpca.evaluation.measures import COLUMNS, TIDY_COLUMNS, read_clustered, tidy
 from gpca.experiments import registration_methods
-from gpca.experiments.registration_methods import (
-    collect,
-    share_of_milder,
-    table11_registration,
-)
+from gpca.experiments.registration_methods import collect, share_of_milder, table11_registration
 from gpca.io.csv_file import write_csv
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.tables.cells import rows_where

@@ -8,14 +8,7 @@ from gpca.errors import InputError
 from gpca.evaluation.measures import tidy
 from gpca.experiments import registration_methods
 from gpca.experiments.registration_methods import read_seconds
-from gpca.experiments.scans import (
-    check,
-    collect,
-    names,
-    table17_published,
-    table17_scans,
-    titles_of_scans,
-)
+from gpca.experiments.scans import check, collect, names, table17_published, table17_scans, titles_of_scans
 from gpca.io.csv_file import write_csv
 from gpca.reporting.tables.cells import rows_where
 from tests.experiments.runs import run_with

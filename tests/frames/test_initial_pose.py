@@ -232,10 +232,7 @@ HEADS = {
     "no head": ("1,0,1,1.0,1 0 0 0 1 0 0 0 1,0 0 700,-1", "column 'scene_id' is missing"),
 }
 
-FILES = {
-    "empty": (b"", "is empty"),
-    "UTF-16": (HEAD.encode("utf-16"), "is not a readable CSV file"),
-}
+FILES = {"empty": (b"", "is empty"), "UTF-16": (HEAD.encode("utf-16"), "is not a readable CSV file")}
 
 
 @pytest.mark.parametrize(

@@ -103,10 +103,7 @@ def test_open3d_comes_without_its_windows_which_others_may_import_later():
     ("package", "expected"),
     [
         ("import ctypes\nctypes.CDLL('libgpca-absent.so.3')\n", "provides libgpca-absent.so.3"),
-        (
-            "raise ImportError('libGL.so.1: cannot open shared object file: No such file')\n",
-            "provides libGL.so.1",
-        ),
+        ("raise ImportError('libGL.so.1: cannot open shared object file: No such file')\n", "provides libGL.so.1"),
         ("raise ImportError('undefined symbol')\n", "make environment"),
     ],
 )

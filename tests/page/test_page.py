@@ -151,10 +151,7 @@ def test_an_incomplete_folder_names_all_that_is_missing_and_the_command(copied):
 
 @pytest.mark.parametrize(
     ("damaged", "text", "fault"),
-    [
-        ("tiny/comparison.csv", "", "is empty"),
-        ("tiny/causes/four/seed100.npz", "PK", "is not a readable npz archive"),
-    ],
+    [("tiny/comparison.csv", "", "is empty"), ("tiny/causes/four/seed100.npz", "PK", "is not a readable npz archive")],
 )
 def test_a_damaged_file_is_named(copied, damaged, text, fault):
     folder, run = copied

@@ -5,13 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gpca.pairs.perturbation import within_half_space
-from gpca.reenactment.hypotheses import (
-    distinct_rows,
-    find_hypotheses,
-    log_prior,
-    rotations,
-    search_starts,
-)
+from gpca.reenactment.hypotheses import distinct_rows, find_hypotheses, log_prior, rotations, search_starts
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
 from gpca.rigid import exp, inverse, rotation_angle_rad, transform

@@ -7,14 +7,7 @@ from gpca.objects.surface import instance_of
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.synthesis import registered_backwards
 from gpca.rigid import inverse, transform
-from gpca.steps.control_samples import (
-    RELABELED,
-    ControlSettings,
-    left_out,
-    of_unseen_objects,
-    relabeled,
-    thinned,
-)
+from gpca.steps.control_samples import RELABELED, ControlSettings, left_out, of_unseen_objects, relabeled, thinned
 
 
 def test_a_thinned_cloud_has_a_random_number_of_its_own_points(six):

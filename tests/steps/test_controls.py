@@ -159,8 +159,7 @@ def test_an_encoder_of_an_explainer_is_trained_once_for_all_labels_and_anew_for_
 
 
 @pytest.mark.parametrize(
-    ("control", "head", "fewest_points"),
-    [("density", "linear", 32), ("unseen_objects", "linear", None)],
+    ("control", "head", "fewest_points"), [("density", "linear", 32), ("unseen_objects", "linear", None)]
 )
 def test_an_encoder_is_trained_as_its_control_says(six, monkeypatch, control, head, fewest_points):
     given = []

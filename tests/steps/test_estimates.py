@@ -10,11 +10,7 @@ from gpca.causes.settings import CauseSettings
 from gpca.errors import InputError
 from gpca.pairs.judge import Judges
 from gpca.rigid import exp, inverse
-from gpca.steps.estimates import (
-    DrawnCauses,
-    compared,
-    try_estimators,
-)
+from gpca.steps.estimates import DrawnCauses, compared, try_estimators
 from gpca.uncertainty.estimates import COVARIANCE, KINDS, MILLI, REFERENCES, SIXTH, EstimatorPairSettings
 from gpca.uncertainty.spread import divergence
 from tests.conftest import FEW_CAUSES

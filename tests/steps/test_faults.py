@@ -70,9 +70,7 @@ FAULTS = {
         (truncated("scans.npz"), {}, f"scans.npz: {NO_ARCHIVE}"),
         (arrays_changed("scans.npz", offsets=later), {}, "scans.npz: 'offsets' do not match 'points'"),
     ],
-    "estimate": [
-        (arrays_changed("objects.npz", names=reversed_order), {}, ANOTHER_NAME),
-    ],
+    "estimate": [(arrays_changed("objects.npz", names=reversed_order), {}, ANOTHER_NAME)],
     "train_on_causes": [
         (untouched, {"--causes": "registrations.npz"}, "registrations.npz: array"),
         (lines_kept("causes_timings.csv", 3), {}, OTHER_TIMES),
@@ -159,7 +157,7 @@ FAULTS = {
             arrays_changed("shifted.npz", concept=lambda c: np.full_like(c, "pose")),
             {"--learners": ["learner_nearest", "gpca"]},
             "fewer than two concepts",
-        ),
+        )
     ],
     "model": [
         (removed("weights.pt"), {}, "weights.pt: no such weights"),

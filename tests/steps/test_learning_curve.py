@@ -12,14 +12,7 @@ from gpca.causes.settings import CauseSettings, DescriptorSettings
 from gpca.causes.training import QUICK, LabeledSamples
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
-from gpca.steps.learning_curve import (
-    CURVE_COLUMNS,
-    LEARNERS,
-    CurveSettings,
-    describe,
-    labeled_samples,
-    learning_curve,
-)
+from gpca.steps.learning_curve import CURVE_COLUMNS, LEARNERS, CurveSettings, describe, labeled_samples, learning_curve
 from tests.conftest import FEW_CAUSES
 
 SETTINGS = CurveSettings(

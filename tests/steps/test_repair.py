@@ -8,15 +8,7 @@ import pytest
 
 from gpca.alignment.icp import ICPSettings
 from gpca.errors import InputError
-from gpca.experiments.repair import (
-    RIVAL,
-    THIRDS,
-    collect,
-    mean_seconds,
-    measured,
-    table20_lead,
-    table20_repair,
-)
+from gpca.experiments.repair import RIVAL, THIRDS, collect, mean_seconds, measured, table20_lead, table20_repair
 from gpca.io.csv_file import write_csv
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.steps.repair import LIKELIEST, NEVER, REPAIR, TESTS, Attempts, RepairSettings, World, searched, try_all
