@@ -15,15 +15,8 @@ from gpca.frames.dataset import Dataset, read_models
 from gpca.frames.initial_pose import InitialPoseSettings, read_bop_results
 from gpca.frames.instances import FARTHEST, read_instances
 from gpca.io.csv_file import read_csv
+from gpca.objects import canonical
 from gpca.objects.bop import read_models_info
-from gpca.objects.canonical import (
-    TRAINING,
-    ObjectClouds,
-    read_object_splits,
-    read_scene_splits,
-    sample_objects,
-    write_objects,
-)
 from gpca.objects.source import DATA, VERSION, require_whole, resolve, surfaces
 
 PARTS = ("ycb", "ycbv", "lm", "lmo", "estimates")
@@ -89,9 +82,9 @@ def test_a_folder_with_other_data_hides_none_of_ours(config, tmp_path):
 )  # fmt: skip
 def test_every_source_is_read_with_its_families(name, count, smallest_m, largest_m, tmp_path):
     entry = resolve(entries()[name], None)
-    write_objects(surfaces(entry, tmp_path), name, tmp_path / "objects.npz", 512, OBJECTS)
-    clouds = ObjectClouds.load(tmp_path / "objects.npz", name)
-    places = read_object_splits(OBJECTS, name)
+    canonical.write_objects(surfaces(entry, tmp_path), name, tmp_path / "objects.npz", 512, OBJECTS)
+    clouds = canonical.ObjectClouds.load(tmp_path / "objects.npz", name)
+    places = canonical.read_object_splits(OBJECTS, name)
     assert len(clouds) == count
     assert smallest_m < clouds.diameters_m.min() <= clouds.diameters_m.max() < largest_m
     assert [(clouds.families[i], clouds.folds[i]) for i in range(count)] == [
@@ -102,7 +95,7 @@ def test_every_source_is_read_with_its_families(name, count, smallest_m, largest
 
 def dataset(name, **changes):
     models = {"models": DATA / "lm"} if name == "lmo" else {}
-    return Dataset(name, (DATA / name,), places=read_scene_splits(SCENES, name), **models, **changes)
+    return Dataset(name, (DATA / name,), places=canonical.read_scene_splits(SCENES, name), **models, **changes)
 
 
 @pytest.mark.parametrize("name", INSTANCES)
@@ -114,26 +107,26 @@ def test_every_frame_is_read_and_every_instance_lies_on_its_model(name, monkeypa
     of = dataset(name)
     frames = of.frames()
     models = read_models(of, frames)
-    objects = sample_objects((model.surface for model in models.values()), name)
+    objects = canonical.sample_objects((model.surface for model in models.values()), name)
     instances = read_instances({name: (of, frames, models)}, objects, InitialPoseSettings("true_pose"))
     assert len(instances) == INSTANCES[name]
     distances_m, diameters_m = np.transpose(near)
     assert distances_m.max() < 5e-3
     assert (distances_m / diameters_m).max() < FARTHEST / 5
     shown = {frame.scene for frame in frames if frame.color}
-    tested = {scene for scene, place in read_scene_splits(SCENES, name).items() if place.role == "evaluation"}
+    tested = {scene for scene, place in canonical.read_scene_splits(SCENES, name).items() if place.role == "evaluation"}
     assert shown == tested
 
 
 def test_development_reads_other_scenes_than_are_tested():
     chosen_by = {frame.scene for frame in dataset("ycbv", role="development").frames()}
-    folds = {scene: dataset("ycbv").fold(scene) for scene in read_scene_splits(SCENES, "ycbv")}
-    assert chosen_by == {scene for scene, fold in folds.items() if fold == TRAINING} == {0, 1, 2}
-    assert {fold for fold in folds.values() if fold != TRAINING} == {0, 1}
+    folds = {scene: dataset("ycbv").fold(scene) for scene in canonical.read_scene_splits(SCENES, "ycbv")}
+    assert chosen_by == {scene for scene, fold in folds.items() if fold == canonical.TRAINING} == {0, 1, 2}
+    assert {fold for fold in folds.values() if fold != canonical.TRAINING} == {0, 1}
 
 
 def test_a_scene_of_a_dataset_that_the_splits_lack_is_named():
-    of = Dataset("lm", (DATA / "lm",), places=read_scene_splits(SCENES, "lmo"))
+    of = Dataset("lm", (DATA / "lm",), places=canonical.read_scene_splits(SCENES, "lmo"))
     with pytest.raises(InputError, match=r"dataset lm: scene 6 is in no split; .*splits\.scenes: null"):
         of.frames()
 
@@ -203,7 +196,7 @@ def test_faulty_splits_are_refused_in_one_line(tmp_path, name):
     path = tmp_path / "objects.csv"
     path.write_text(HEAD + rows)
     with pytest.raises(InputError) as caught:
-        read_object_splits(path, "ycb")
+        canonical.read_object_splits(path, "ycb")
     assert message in str(caught.value)
     assert str(caught.value).startswith(str(path))
 
@@ -212,4 +205,6 @@ def test_an_object_that_the_splits_lack_is_named(tmp_path):
     (tmp_path / "objects.csv").write_text(HEAD + "ycb,a,a,box,evaluation,0\n")
     entry = resolve(entries()["ycb"], None)
     with pytest.raises(InputError, match=r"object 'obj_000001': is in no split; .*splits\.objects: null"):
-        write_objects(surfaces(entry, tmp_path), "ycb", tmp_path / "objects.npz", 512, tmp_path / "objects.csv")
+        canonical.write_objects(
+            surfaces(entry, tmp_path), "ycb", tmp_path / "objects.npz", 512, tmp_path / "objects.csv"
+        )

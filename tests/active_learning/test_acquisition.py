@@ -4,18 +4,9 @@ import numpy as np
 import pytest
 import sklearn.cluster
 
-from gpca.active_learning.acquisition import (
-    EXPANSION,
-    STRATEGIES,
-    Pool,
-    balanced_kmeans,
-    bald_kmeans,
-    kmeans_plusplus,
-    select,
-    top,
-)
+from gpca.active_learning import acquisition
 
-every_strategy = pytest.mark.parametrize("name", STRATEGIES)
+every_strategy = pytest.mark.parametrize("name", acquisition.STRATEGIES)
 
 
 def make_pool(n=40, seed=0, **given):
@@ -28,11 +19,11 @@ def make_pool(n=40, seed=0, **given):
         "h_labeled_L_d": random.normal(size=(5, 4)).astype(np.float32),
         "truth_N": np.array(["noise", "pose", "overlap"])[np.arange(n) % 3],
     }
-    return Pool(**columns | given)
+    return acquisition.Pool(**columns | given)
 
 
 def selected(name, pool, batch, seed=1):
-    return select(name, pool, batch, np.random.default_rng(seed)).tolist()
+    return acquisition.select(name, pool, batch, np.random.default_rng(seed)).tolist()
 
 
 def around(centers, each, seed=0):
@@ -59,13 +50,15 @@ def test_identical_samples_still_give_different_rows(name, labeled):
     assert len(set(selected(name, make_pool(**of_labeled, **alike), 4))) == 4
 
 
-@pytest.mark.parametrize("name", [name for name in STRATEGIES if not STRATEGIES[name].needs_scores])
+@pytest.mark.parametrize(
+    "name", [name for name in acquisition.STRATEGIES if not acquisition.STRATEGIES[name].needs_scores]
+)
 def test_a_strategy_that_needs_no_scores_reads_none(name):
     blind = make_pool(scores_N_C=np.empty((40, 0)), bald_N=np.full(40, np.nan))
     assert selected(name, blind, 4) == selected(name, make_pool(), 4)
 
 
-@pytest.mark.parametrize("name", [name for name in STRATEGIES if not STRATEGIES[name].oracle])
+@pytest.mark.parametrize("name", [name for name in acquisition.STRATEGIES if not acquisition.STRATEGIES[name].oracle])
 def test_only_an_oracle_is_told_the_truth(name):
     assert selected(name, make_pool(truth_N=np.full(40, "")), 4) == selected(name, make_pool(), 4)
 
@@ -85,7 +78,7 @@ def test_the_most_uncertain_are_taken_most_uncertain_first(name, best_first):
 @pytest.mark.parametrize("seed", range(3))
 def test_bald_kmeans_takes_the_middle_of_each_cluster_of_uncertain_samples(batch, seed):
     centers = 20 * np.eye(6)[:batch]
-    uncertain, certain = around(centers, EXPANSION, seed), around(-20 * np.eye(6), 5)
+    uncertain, certain = around(centers, acquisition.EXPANSION, seed), around(-20 * np.eye(6), 5)
     random = np.random.default_rng(seed)
     order = random.permutation(len(uncertain) + len(certain))
     h = np.concatenate([uncertain, certain])[order]
@@ -104,13 +97,13 @@ def test_first_centers_are_those_of_scikit_learn(n, d):
     for h_n_d in (random.normal(size=(n, d)), np.round(random.normal(size=(n, d)))):
         for clusters in (1, min(20, len(np.unique(h_n_d, axis=0)))):
             _, rows = sklearn.cluster.kmeans_plusplus(h_n_d, clusters, random_state=7)
-            assert kmeans_plusplus(h_n_d, clusters, 7) == rows.tolist()
+            assert acquisition.kmeans_plusplus(h_n_d, clusters, 7) == rows.tolist()
 
 
 @pytest.mark.parametrize("n, clusters", [(16, 4), (10, 4), (5, 1), (3, 3)])
 def test_balanced_clusters_hold_as_many_samples_each_and_none_gains_by_an_exchange(n, clusters):
     h = np.random.default_rng(n).normal(size=(n, 3))
-    cluster, centers = balanced_kmeans(h, clusters, np.random.default_rng(0))
+    cluster, centers = acquisition.balanced_kmeans(h, clusters, np.random.default_rng(0))
     sizes = np.bincount(cluster, minlength=clusters)
     assert sizes.max() - sizes.min() <= 1
     assert centers == pytest.approx(np.stack([h[cluster == k].mean(axis=0) for k in range(clusters)]))
@@ -132,14 +125,14 @@ def test_a_crowd_of_uncertain_samples_gets_as_many_labels_as_it_has_shares_of_th
 
 def test_bald_kmeans_names_the_most_uncertain_of_its_choice_first():
     pool = make_pool()
-    rows = bald_kmeans(pool, 4, np.random.default_rng(0))
+    rows = acquisition.bald_kmeans(pool, 4, np.random.default_rng(0))
     assert (np.diff(pool.bald_N[rows]) <= 0).all()
-    assert set(rows) <= set(top(pool.bald_N, 4 * EXPANSION))
+    assert set(rows) <= set(acquisition.top(pool.bald_N, 4 * acquisition.EXPANSION))
 
 
 def test_bald_stochastic_draws_in_proportion_to_bald():
     pool, random = make_pool(5, bald_N=np.array([0.0, 0.1, 0.2, 0.3, 0.4])), np.random.default_rng(0)
-    draws = [STRATEGIES["bald_stochastic"].choose(pool, 5, random).tolist() for _ in range(2000)]
+    draws = [acquisition.STRATEGIES["bald_stochastic"].choose(pool, 5, random).tolist() for _ in range(2000)]
     assert {rows[-1] for rows in draws} == {0}
     first = Counter(rows[0] for rows in draws)
     assert [first[row] / 2000 for row in range(1, 5)] == pytest.approx([0.1, 0.2, 0.3, 0.4], abs=0.05)

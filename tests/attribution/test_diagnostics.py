@@ -49,14 +49,11 @@ def test_all_right_and_all_wrong_have_defined_areas(all_wrong):
     assert d.augrc(np.arange(20), wrong) == (pytest.approx(0.525) if all_wrong else 0)
 
 
-def test_calibrated_predictions_have_no_error_and_overconfident_ones_their_excess():
+def test_calibrated_predictions_have_no_error_overconfident_ones_their_excess_and_in_a_bin_signs_cancel():
     p = RANDOM.uniform(0.4, 1, size=20000)
     target = np.where(RANDOM.uniform(size=len(p)) < p, 0, 1)
     assert d.calibration_error(confident(p), target) < 0.015
     assert d.calibration_error(confident(np.full(1000, 0.95)), np.arange(1000) % 10 // 7) == pytest.approx(0.25)
-
-
-def test_bins_hold_a_confidence_of_one_and_within_one_errors_of_both_signs_cancel():
     assert d.calibration_error(confident(np.ones(10)), np.arange(10) % 2) == pytest.approx(0.5)
     p = np.concatenate([np.full(160, 0.94), np.full(140, 0.99)])
     target = np.concatenate([np.zeros(160), np.arange(140) % 10 == 0]).astype(int)

@@ -87,15 +87,12 @@ def turned(angle, shift=0.0):
     return T
 
 
-def test_icps_own_motion_is_told(pair):
+def test_icps_own_motion_and_the_spread_of_its_runs_are_told(pair):
     found = motion(replace(pair, T_init=inverse(turned(0.4))))
     assert found["rotation"] == pytest.approx(0.4)
     assert found["translation"] == pytest.approx(0, abs=1e-9)
     assert found["displacement"] > 0.05
     assert motion(pair)["displacement"] == 0
-
-
-def test_the_spread_is_that_of_the_runs(pair):
     angles = np.random.default_rng(0).normal(scale=0.2, size=13)
     found = motion(replace(pair, T_runs=np.array([turned(angle) for angle in angles])))
     assert found["spread_rotation"] == pytest.approx(angles.std(ddof=1))
@@ -127,9 +124,12 @@ def columns_shown(sees, group):
     return (seen({group: NUMBERED[group]}, sees, {group: slice(None)})[0] - NUMBERED[group][0, 0]).astype(int).tolist()
 
 
-def test_all_parts_show_every_descriptor_in_order():
+def test_all_parts_show_every_descriptor_in_order_and_the_source_alone_the_observed_cloud():
     assert seen(NUMBERED, ALL_PARTS)[0].tolist() == list(range(FIRST[-1]))
     assert seen(NUMBERED, ALL_PARTS[::-1]).shape == (2, sum(WIDTHS[group] for group in EVERYTHING))
+    assert columns_shown(("source",), "distances") == list(range(3 * QUANTILES, 4 * QUANTILES))
+    assert columns_shown(("source",), "planes") == [3 * QUANTILES + i for i in (0, 2, 4)]
+    assert seen(NUMBERED, ("source",)).shape == (2, QUANTILES + 3)
 
 
 def test_without_motion_nothing_says_how_far_a_cloud_was_moved_or_would_be():
@@ -141,12 +141,6 @@ def test_without_motion_nothing_says_how_far_a_cloud_was_moved_or_would_be():
             arrays[group][:, columns] = np.nan
     assert not np.isnan(seen(arrays, ("pair",))).any()
     assert np.isnan(seen(arrays, ("pair", "motion"))).sum() == 2 * 3
-
-
-def test_the_source_alone_shows_the_observed_cloud():
-    assert columns_shown(("source",), "distances") == list(range(3 * QUANTILES, 4 * QUANTILES))
-    assert columns_shown(("source",), "planes") == [3 * QUANTILES + i for i in (0, 2, 4)]
-    assert seen(NUMBERED, ("source",)).shape == (2, QUANTILES + 3)
 
 
 def test_quick_remedies_show_no_run_that_restarts_and_nothing_that_is_relative_to_one():
@@ -179,22 +173,16 @@ def test_all_remedies_together_stand_for_the_truth_and_what_they_explain_adds_up
     assert sum(phi) == pytest.approx(found[f"error_{ALL}"])
 
 
-def test_missing_surface_is_what_aligning_the_other_way_mends(pair):
+def test_missing_surface_a_bad_start_and_noise_are_what_their_remedies_mend(pair):
     half = pair.observed[pair.observed[:, 2] > np.quantile(pair.observed[:, 2], 0.4)]
     found = remedied(registered(pair, half))
     assert found[f"error_{1 << OVERLAP}"] > 0.04
     assert found["phi_overlap"] == max(found[f"phi_{name}"] for name in ("noise", "pose", "overlap"))
-
-
-def test_a_bad_start_is_what_restarts_mend(pair):
     T_init = np.eye(4)
     T_init[:3, :3] = Rotation.from_rotvec([0, 0, np.deg2rad(75)]).as_matrix()
     found = remedied(registered(pair, pair.observed, T_init))
     assert found[f"cost_{1 << POSE}"] >= found["cost_0"]
     assert found["moved_0"] > 0.05
-
-
-def test_outliers_are_counted_and_smoothing_measured(pair):
     random = np.random.default_rng(0)
     noisy = pair.observed + random.normal(scale=0.03, size=pair.observed.shape)
     assert remedied(replace(pair, observed=noisy))["smoothed"] > remedied(pair)["smoothed"]

@@ -13,15 +13,12 @@ def names(subjects):
     return [subject.name for subject in subjects]
 
 
-def test_no_object_is_in_both_splits_and_seeds_differ(subjects):
+def test_neither_an_object_nor_views_of_one_instance_are_in_both_splits_and_seeds_differ(subjects):
     splits = [split_by_object(subjects, "four", seed, SETTINGS) for seed in range(100, 108)]
     for split in splits:
         assert sorted(names(split["train"]) + names(split["test"])) == sorted(names(subjects))
         assert len(split["test"]) == 1  # 0.3 of four
     assert len({names(split["test"])[0] for split in splits}) > 1
-
-
-def test_views_of_one_instance_stay_together(subjects):
     views = [replace(subjects[0], name=f"mug_{i}_1_{view}", family=f"mug_{i}") for i in range(4) for view in range(5)]
     for seed in range(100, 105):
         split = split_by_object(views, "views", seed, SETTINGS)

@@ -30,16 +30,12 @@ def test_what_is_uncertain_or_has_no_dominant_concept_is_queued():
     assert "no concept dominates" in POLICY.decide(even).reason
 
 
-def test_a_treatment_that_improved_too_little_is_followed_by_the_next_concept():
+def test_a_treatment_that_improved_too_little_is_followed_by_the_next_and_at_last_the_case_is_queued():
     said = scores(noise=0.1, pose=0.6, overlap=0.3)
     assert POLICY.decide(said, before=[Treated("pose", 0.05)]).action == "new_view"
     assert POLICY.decide(said, before=[Treated("pose", 0.15)]).action == "reinitialize"
     twice = [Treated("pose", 0.0), Treated("overlap", -0.2)]
     assert POLICY.decide(said, before=twice).action == "denoise"
-
-
-def test_after_attempts_without_improvement_a_case_is_queued():
-    said = scores(noise=0.1, pose=0.6, overlap=0.3)
     before = [Treated("pose", 0.0), Treated("overlap", 0.0), Treated("noise", 0.09)]
     assert POLICY.decide(said, before=before).action == QUEUE
     assert POLICY.decide(said, before=[*before[:2], Treated("noise", 0.11)]).action != QUEUE

@@ -124,14 +124,11 @@ def test_pairs_that_share_too_little_are_left_out_and_named(capsys):
     assert "pair corner/target/source is skipped: too few of its points lie on surface" in capsys.readouterr().err
 
 
-def test_what_finds_no_correspondence_failed_by_its_pose():
+def test_what_finds_no_correspondence_failed_by_its_pose_and_a_ball_holds_none():
     pair = corner_pair(1.0)
     away = rigid_motion(np.eye(3), [30.0, 0, 0]) @ pair.T_target_source
     _, table = measured(pair, module.ScanStart(0, module.LADDER, "far", away))
     assert table[["missed", "state", "dominant"]].to_numpy().tolist() == [[True, FAILED, "pose"]]
-
-
-def test_a_ball_holds_no_pose():
     pair = corner_pair(1.0, ball=True)
     _, table = measured(pair, module.ScanStart(0, module.LADDER, "rung", start_off(pair, 1, 0.01)))
     assert table["error_clean"][0] > SETTINGS.limits.nominal and table["dominant"].tolist() == [GEOMETRY]

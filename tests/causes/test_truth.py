@@ -19,31 +19,22 @@ def additive(none, *parts):
     return tuple(none + sum(part for i, part in enumerate(parts) if subset >> i & 1) for subset in range(8))
 
 
-def test_states_follow_the_limits():
+def test_states_follow_the_limits_of_the_error_and_of_the_uncertainty():
     found = truth((0.01, 0.0199), (0.01, 0.02), (0.01, 0.03), (0.01, 0.0301), (0.01, 0.5))
     assert found.state.tolist() == ["nominal", "borderline", "borderline", "failed", "failed"]
-
-
-def test_what_is_right_but_more_uncertain_than_clean_pairs_is_borderline():
     assert truth((0.01, 0.01), u=5.0).state.tolist() == ["nominal"]
     assert truth((0.01, 0.01), u=5.1).state.tolist() == ["borderline"]
     assert truth((0.01, 0.2), u=0.0).state.tolist() == ["failed"]  # certain of the wrong pose
 
 
-def test_the_dominant_cause_adds_most_and_the_causes_more_than_their_limit():
+def test_the_dominant_cause_adds_most_is_tied_with_what_adds_nearly_as_much_and_may_be_geometry():
     found = truth(additive(0.01, 0.02, 0.2, 0.005), additive(0.01, -0.005, 0, 0.1))  # what helps has a negative part
     assert found.phi == pytest.approx(np.array([[0.02, 0.2, 0.005], [-0.005, 0, 0.1]]))
     assert found.dominant.tolist() == ["pose", "overlap"]
     assert found.causes.tolist() == [[True, True, False], [False, False, True]]
-
-
-def test_what_is_off_when_clean_is_geometry_where_that_is_more_than_any_cause_adds():
     found = truth(additive(0.05, 0.01, 0, 0), additive(0.05, 0.2, 0, 0), additive(0.019, 0, 0, 0))
     assert found.geometry.tolist() == [True, True, False]
     assert found.dominant.tolist()[:2] == ["geometry", "noise"]
-
-
-def test_causes_that_add_nearly_as_much_as_the_dominant_one_are_tied():
     found = truth(additive(0.01, 0.1, 0.0901, 0.08), additive(0.01, 0.2, 0, 0))
     assert found.tied.tolist() == [[True, True, False], [True, False, False]]
     assert found.margin == pytest.approx([0.0099, 0.2])

@@ -6,23 +6,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from gpca.comparison import joint_reading
 from gpca.comparison.chance import is_close, p_value, permuted, weights
-from gpca.comparison.joint_reading import (
-    CHOICES,
-    PARTS,
-    TABLES,
-    numbers_asked,
-    part_name,
-    scores_of_values,
-    search,
-    values_of,
-)
 from gpca.comparison.published import Number, read_published
 from gpca.experiments.joint_reading import names
 
 from .made_up import ACCURACY, TOLERANCES, tidy
 
-GRID = {choice: ["only"] for choice in CHOICES} | {
+GRID = {choice: ["only"] for choice in joint_reading.CHOICES} | {
     "severities": ["protocol", "weaker"],
     "knobs": ["middle", "low"],
     "new_share": [0.33, 0.02],
@@ -46,19 +37,19 @@ POOLS = {("protocol", 0.33): 100, ("protocol", 0.02): 90, ("weaker", 0.33): 4, (
 
 @pytest.fixture
 def rows():
-    joint = dict.fromkeys(CHOICES, "only")
+    joint = dict.fromkeys(joint_reading.CHOICES, "only")
     values = {}
     for (severities, knobs), value in KNOBS.items():
-        name = part_name("knobs", joint | {"severities": severities, "knobs": knobs})
+        name = joint_reading.part_name("knobs", joint | {"severities": severities, "knobs": knobs})
         values[name, "shap", "accuracy"] = value
     for (severities, new_share), value in POOLS.items():
-        name = part_name("labels", joint | {"severities": severities, "new_share": new_share})
+        name = joint_reading.part_name("labels", joint | {"severities": severities, "new_share": new_share})
         values |= {(name, "bald", "labels_to_target"): value, (name, "bald", "reached"): float(value != 20)}
     return measured(values)
 
 
 def test_one_reading_has_to_fit_all_tables(rows):
-    found = search([SHAP, LABELS], [SHAP, LABELS], rows, GRID, TOLERANCES, deals=5)
+    found = joint_reading.search([SHAP, LABELS], [SHAP, LABELS], rows, GRID, TOLERANCES, deals=5)
     # Under weaker perturbations 20 labels would be close, but were stopped before the target.
     assert (found.joint["severities"], found.joint["knobs"], found.joint["new_share"]) == ("protocol", "low", 0.33)
     assert found.share == 0.5
@@ -66,30 +57,30 @@ def test_one_reading_has_to_fit_all_tables(rows):
     assert (found.readings, found.equals, found.protocol) == (8, 4, 0)
     assert [share for _, share in found.best] == [0.5] * 4 + [0] * 4
     reached = rows.assign(value=rows["value"].where(rows["metric"] != "reached", 1.0))
-    found = search([SHAP, LABELS], [SHAP, LABELS], reached, GRID, TOLERANCES, deals=5)
+    found = joint_reading.search([SHAP, LABELS], [SHAP, LABELS], reached, GRID, TOLERANCES, deals=5)
     assert (found.joint["severities"], found.joint["knobs"], found.joint["new_share"]) == ("weaker", "middle", 0.02)
     assert (found.share, found.equals) == (1, 1)
 
 
 def test_by_chance_other_numbers_of_the_same_unit_come_into_a_place(rows):
     other = number("I", 91.0, "gpca_paper", column="SHAP")
-    found = search([SHAP], [SHAP, other], rows, GRID, TOLERANCES, deals=200)
+    found = joint_reading.search([SHAP], [SHAP, other], rows, GRID, TOLERANCES, deals=200)
     assert found.share == 1
     assert set(found.by_chance["unit"]) == {1.0}  # 91 is close to a reading too
     far = number("I", 70.0, "gpca_paper", column="SHAP")
-    found = search([SHAP], [SHAP, far], rows, GRID, TOLERANCES, deals=200)
+    found = joint_reading.search([SHAP], [SHAP, far], rows, GRID, TOLERANCES, deals=200)
     assert found.by_chance["unit"].mean() == pytest.approx(0.5, abs=0.15)
     assert set(found.by_chance["column"]) == {1.0}  # it stands in another column
 
 
 def test_values_are_means_over_the_seeds(rows):
     more = pd.concat([rows, rows.assign(seed=1, value=rows["value"] * 1.1)])
-    assert values_of(SHAP, more)["knobs/protocol/middle"] == (pytest.approx(52.5), False)
-    assert values_of(LABELS, rows)["labels/weaker/only/only/only/only/only/0.02"] == (20, True)
+    assert joint_reading.values_of(SHAP, more)["knobs/protocol/middle"] == (pytest.approx(52.5), False)
+    assert joint_reading.values_of(LABELS, rows)["labels/weaker/only/only/only/only/only/0.02"] == (20, True)
 
 
 def test_deals_stay_within_their_group_and_are_the_same_every_time():
-    printed = numbers_asked(read_published())
+    printed = joint_reading.numbers_asked(read_published())
     for within, of in (("unit", lambda n: (n.table, n.unit)), ("column", lambda n: (n.table, n.column, n.unit))):
         dealt_D_K = permuted(printed, within, 50)
         np.testing.assert_array_equal(np.sort(dealt_D_K, axis=1), np.tile(np.arange(len(printed)), (50, 1)))
@@ -100,15 +91,15 @@ def test_deals_stay_within_their_group_and_are_the_same_every_time():
 
 
 def test_each_table_weighs_the_same_each_value_counts_once_and_every_choice_matters():
-    printed = numbers_asked(read_published())
+    printed = joint_reading.numbers_asked(read_published())
     weight_K = weights(printed)
     assert weight_K.sum() == pytest.approx(1)
     table_K = np.array([number.table for number in printed])
-    assert [weight_K[table_K == table].sum() for table in TABLES] == pytest.approx([0.2] * 5)
+    assert [weight_K[table_K == table].sum() for table in joint_reading.TABLES] == pytest.approx([0.2] * 5)
     assert len(printed) == 54
-    assert len(numbers_asked(read_published(), ["ycb"])) == 25
+    assert len(joint_reading.numbers_asked(read_published(), ["ycb"])) == 25
     assert not [number for number in printed if number.same_as]
-    assert {choice for of_part in PARTS.values() for choice in of_part} == set(CHOICES)
+    assert {choice for of_part in joint_reading.PARTS.values() for choice in of_part} == set(joint_reading.CHOICES)
 
 
 def test_close_is_within_the_second_tolerance_and_no_lower_bound():
@@ -124,7 +115,7 @@ def test_fixed_values_are_scored_beside_dealt_ones():
     far = number("I", 70.0, "gpca_paper", column="SHAP")
     records = {
         (table, metric): value
-        for table, _, metric, value in scores_of_values(
+        for table, _, metric, value in joint_reading.scores_of_values(
             [SHAP, far], [(31, False), (71, False)], TOLERANCES, 100, "mine"
         )
     }

@@ -46,14 +46,11 @@ def test_the_names_of_a_section_are_read_apart_from_its_values(sidecar, read):
     assert config_token(changed(explainers={"gpca": {"draws": 10}}), path) != "first"
 
 
-def test_a_section_read_as_a_whole_counts_with_all_its_values(sidecar):
+def test_a_section_read_as_a_whole_counts_with_all_its_values_and_an_absent_key_too(sidecar):
     path = sidecar(lambda config: dict(config["success"]) | {} | config["explainers"]["gpca"])
     assert config_token(changed(success={"error": 0.03, "curve": [0.02]}), path) != "first"
     assert config_token(changed(explainers={"gpca": {"draws": 11}, "rule": None}), path) != "first"
     assert config_token(changed(seeds=[]), path) == "first"
-
-
-def test_a_key_that_was_absent_counts_too(sidecar):
     path = sidecar(lambda config: config.get("figures"))
     assert config_token(CONFIG, path) == "first"
     assert config_token(changed(figures={"source": "ycb"}), path) != "first"

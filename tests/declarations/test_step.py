@@ -79,12 +79,9 @@ def test_functions_are_asked_for_every_job():
     assert [("gpca.portable" in rule.modules(Wildcards(source=name))) for name in ("ycb", "cups")] == [True, False]
 
 
-def test_lists_have_the_plural_of_their_name():
+def test_lists_have_the_plural_of_their_name_and_data_comes_from_outside_the_run():
     rule = rule_of(step(outputs={"out": "curves/{*strategy}.csv"}, where={"strategy": "method"}), PLAN)
     assert rule.params["strategies"] == NAMES["method"]
-
-
-def test_data_comes_from_outside_the_run():
     rule = rule_of(step(data=lambda plan, wildcards: [f"data/{wildcards.source}.ply"]), PLAN)
     assert rule.data["data"](Wildcards(source="ycb")) == ["data/ycb.ply"]
     assert rule_of(step(), PLAN).data == {}

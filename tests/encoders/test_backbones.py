@@ -61,21 +61,15 @@ def shapes(*layers):
     return [linear.weight.shape for layer in layers for linear in layer.linears]
 
 
-def test_pointnet_has_the_published_widths():
+def test_backbones_have_the_published_widths_and_numbers_of_parameters():
     encoder = make_encoder("pointnet", {})
     assert shapes(encoder.layers) == POINTNET and encoder.embedding_size == 1024
-
-
-def test_pointnet2_has_the_published_widths_and_the_points_own_coordinates():
     encoder = make_encoder("pointnet2", {})
     assert shapes(*encoder.levels, encoder.whole) == [
         (64, 3 + 3), (64, 64), (128, 64), (128, 3 + 128), (128, 128), (256, 128), (256, 3 + 256), (512, 256),
         (1024, 512),
     ]  # fmt: skip
     assert encoder.embedding_size == 1024
-
-
-def test_pointnext_has_the_published_number_of_parameters():
     encoder = make_encoder("pointnext", {})
     assert encoder.embedding_size == 512
     # 1.374 million with ModelNet40's head of 512, 256 and 40 units (official implementation).
@@ -88,14 +82,11 @@ def test_no_normalization_hides_a_shift_a_scale_or_a_rotation(encoder, change):
     assert (encoder(change(clouds())) - encoder(clouds())).abs().max() > 1e-2
 
 
-def test_the_order_of_the_points_after_the_first_does_not_matter(encoder):
-    """Point 0 is where the sampling of centroids starts; a ball that is not full holds the same points anyway."""
+def test_an_embedding_depends_neither_on_the_order_of_points_nor_on_other_clouds(encoder):
+    # Point 0 is where the sampling of centroids starts; a ball that is not full holds the same points anyway.
     points = clouds()
     order = torch.cat([torch.zeros(1, dtype=torch.long), 1 + torch.randperm(points.shape[1] - 1)])
     torch.testing.assert_close(encoder(points[:, order]), encoder(points), atol=1e-4, rtol=1e-4)
-
-
-def test_a_cloud_does_not_depend_on_the_others_of_its_batch(encoder):
     torch.testing.assert_close(encoder(clouds()[2:3]), encoder(clouds())[2:3], atol=1e-5, rtol=1e-5)
 
 

@@ -24,13 +24,10 @@ def in_ball_by_a_loop(points_N_3, center_3, radius, k):
     return found + found[:1] * (k - len(found)), len(found)
 
 
-def test_farthest_points_are_those_of_a_plain_loop():
+def test_farthest_points_are_those_of_a_plain_loop_and_coincide_only_when_no_other_is_left():
     points = clouds()
     expected = [farthest_by_a_loop(cloud.double().numpy(), 20) for cloud in points]
     assert farthest_points(points, 20).tolist() == expected
-
-
-def test_of_a_small_cloud_every_point_is_a_center_and_coinciding_ones_only_when_no_other_is_left():
     assert farthest_points(clouds(2, 5), 8).tolist() == [[0, 1, 2, 3, 4]] * 2
     points = torch.tensor([[[0.0, 0, 0], [0, 0, 0], [1, 0, 0], [0, 0, 0]]])
     assert farthest_points(points, 2).tolist() == [[0, 2]]

@@ -198,14 +198,6 @@ def test_training_goes_on_from_given_weights(registrations):
     assert torch.allclose(on.head.weight, first.head.weight, atol=1e-5)
 
 
-@pytest.fixture(scope="module")
-def model():
-    torch.manual_seed(0)
-    encoder = make_encoder("dgcnn", SETTINGS.options)
-    head = torch.nn.Linear(encoder.embedding_size, 3)
-    return torch.nn.Sequential(OrderedDict(encoder=encoder, head=head)).eval()
-
-
 def test_points_are_of_the_cloud_and_named_by_sample_not_by_batch(registrations):
     together = draw_points(registrations, np.array([4, 9, 40]), 32, "tiny", 0, "epoch", 1)
     assert together.shape == (3, 32, 3)
@@ -218,7 +210,11 @@ def test_points_are_of_the_cloud_and_named_by_sample_not_by_batch(registrations)
     assert not torch.equal(other, together)
 
 
-def test_an_embedding_is_the_mean_over_its_draws(registrations, model):
+def test_an_embedding_is_the_mean_over_its_draws(registrations):
+    torch.manual_seed(0)
+    encoder = make_encoder("dgcnn", SETTINGS.options)
+    head = torch.nn.Linear(encoder.embedding_size, 3)
+    model = torch.nn.Sequential(OrderedDict(encoder=encoder, head=head)).eval()
     rows = np.arange(len(registrations))
     with torch.no_grad():
         draws = [model.encoder(draw_points(registrations, rows, 64, "tiny", 0, "embedding", draw)) for draw in range(2)]

@@ -5,17 +5,7 @@ from gpca.causes.candidate import replay
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import ALL, FAILED, SUBSETS
 from gpca.errors import InputError
-from gpca.experiments.cause_figures import (
-    CLEAR,
-    GAP,
-    TRUTH,
-    _draw_scores,
-    _draw_waterfall,
-    causes_example,
-    failures,
-    is_clear,
-    usual_failure,
-)
+from gpca.experiments import cause_figures
 from gpca.objects.canonical import write_objects
 from gpca.objects.procedural import surfaces
 from gpca.pairs.perturbation import CONCEPTS
@@ -26,7 +16,7 @@ from tests.judged import write_run
 
 
 def test_a_sample_is_drawn_again_where_it_lay(four, causes):
-    row = usual_failure(causes, "causes.npz", is_clear(causes))
+    row = cause_figures.usual_failure(causes, "causes.npz", cause_figures.is_clear(causes))
     model, observed_8 = replay(four, causes, row, "four", 100, CauseSettings(**FEW_CAUSES))
     assert observed_8[ALL] == pytest.approx(causes.registrations.cloud(row), abs=1e-5)
     assert np.array_equal(model.astype(np.float32), causes.registrations.target(row))
@@ -35,18 +25,20 @@ def test_a_sample_is_drawn_again_where_it_lay(four, causes):
 
 
 def test_the_sample_shown_failed_by_several_causes_of_which_one_is_as_clear_as_usual(causes):
-    row = usual_failure(causes, "causes.npz", is_clear(causes))
+    row = cause_figures.usual_failure(causes, "causes.npz", cause_figures.is_clear(causes))
     failed = causes.rows("test")[causes.truth.state[causes.rows("test")] == FAILED]
     several = failed[causes.truth.causes[failed].sum(axis=1) > 1]
     phi = np.maximum(causes.truth.phi, 0)
     share = phi.max(axis=1) / phi.sum(axis=1)
-    clear = several[share[several] >= CLEAR]
+    clear = several[share[several] >= cause_figures.CLEAR]
     assert row in (clear if len(clear) else several)
     margins = causes.truth.margin[clear if len(clear) else several]
     assert causes.truth.margin[row] in margins[margins >= np.median(margins)]
     assert (margins >= causes.truth.margin[row]).mean() >= 0.5 or len(margins) == 1
     with pytest.raises(InputError, match="has no failed test sample"):
-        usual_failure(causes.subset(causes.rows("train")), "causes.npz", is_clear(causes)[causes.rows("train")])
+        cause_figures.usual_failure(
+            causes.subset(causes.rows("train")), "causes.npz", cause_figures.is_clear(causes)[causes.rows("train")]
+        )
 
 
 def test_what_was_measured_stands_apart_from_the_scores_and_the_largest_of_a_row_is_bold():
@@ -54,8 +46,8 @@ def test_what_was_measured_stands_apart_from_the_scores_and_the_largest_of_a_row
 
     figure, panel = plt.subplots()
     numbers = np.array([[0.0, 0.5, 0.3, 0.2], [0.1, 0.2, 0.9, 0.8], [0.7, 0.1, 0.1, 0.1]])
-    _draw_scores(panel, [TRUTH, "Multi-label", "Right"], numbers, ["", "wrong", "tie"])
-    assert panel.get_yticks().tolist() == [0, 1 + GAP, 2 + GAP]
+    cause_figures._draw_scores(panel, [cause_figures.TRUTH, "Multi-label", "Right"], numbers, ["", "wrong", "tie"])
+    assert panel.get_yticks().tolist() == [0, 1 + cause_figures.GAP, 2 + cause_figures.GAP]
     bold = {text.get_text() for text in panel.texts if text.get_fontweight() == "bold"}
     assert bold == {"0.50", "0.90", "0.70", "", "tie"}
     plt.close(figure)
@@ -65,9 +57,9 @@ def test_the_bars_of_a_waterfall_begin_where_others_end_and_add_up(causes):
     import matplotlib.pyplot as plt
 
     figure, panel = plt.subplots()
-    row = usual_failure(causes, "causes.npz", is_clear(causes))
+    row = cause_figures.usual_failure(causes, "causes.npz", cause_figures.is_clear(causes))
     error_8, phi_3 = causes.truth.error[row], causes.truth.phi[row]
-    _draw_waterfall(panel, error_8[SUBSETS.index(())], phi_3)
+    cause_figures._draw_waterfall(panel, error_8[SUBSETS.index(())], phi_3)
     first, *added, last = panel.patches
     ends = [first.get_width(), *(bar.get_x() + bar.get_width() for bar in added)]
     assert [bar.get_x() for bar in added] == pytest.approx(ends[:-1])
@@ -92,7 +84,7 @@ def objects_in(folder):
 
 def test_a_failure_of_each_cause_is_shown_with_who_names_it(causes, run, tmp_path):
     predictions, [truth] = write_run(tmp_path, causes)
-    figure = failures(run, [objects_in(tmp_path)], [truth], predictions)
+    figure = cause_figures.failures(run, [objects_in(tmp_path)], [truth], predictions)
     failed = (causes.registrations.split == "test") & (causes.truth.state == FAILED)
     words = {text for text in words_of(figure) if " off" in text or "no failure" in text}
     assert len(words) == len(CONCEPTS)
@@ -105,8 +97,8 @@ def test_a_failure_of_each_cause_is_shown_with_who_names_it(causes, run, tmp_pat
 
 def test_the_example_names_its_dataset_and_who_is_right(causes, run, tmp_path):
     predictions, [truth] = write_run(tmp_path, causes)
-    figure = causes_example(run, objects_in(tmp_path), truth, predictions)
-    words, row = words_of(figure), usual_failure(causes, truth, is_clear(causes))
+    figure = cause_figures.causes_example(run, objects_in(tmp_path), truth, predictions)
+    words, row = words_of(figure), cause_figures.usual_failure(causes, truth, cause_figures.is_clear(causes))
     assert words[0].startswith(f"Four: {causes.registrations.object_name[row].partition('_')[2].replace('_', ' ')}.")
     phi_3 = np.maximum(causes.truth.phi[row], 0)
     assert {"without causes", "Right", "right", *(f"{share:.2f}" for share in phi_3 / phi_3.sum())} <= set(words)

@@ -37,22 +37,13 @@ def predictions(seed):
     return pd.DataFrame(rows)
 
 
-@pytest.fixture
-def files(tmp_path):
-    given = []
+def test_values_are_those_of_the_metrics_with_intervals_over_families_and_seeds(tmp_path):
+    files = []
     for seed in range(2):
-        given.append(tmp_path / f"predictions/ycb/gpca/seed{seed}.csv")
-        write_csv(given[-1], predictions(seed))
-    return given
-
-
-@pytest.fixture
-def collected(files, tmp_path):
+        files.append(tmp_path / f"predictions/ycb/gpca/seed{seed}.csv")
+        write_csv(files[-1], predictions(seed))
     write_csv(tmp_path / "intervals.csv", collect_intervals(files), form=None)
-    return read_clustered(tmp_path / "intervals.csv").set_index(["metric", "concept"])
-
-
-def test_values_are_those_of_the_metrics_with_intervals_over_families_and_seeds(files, collected):
+    collected = read_clustered(tmp_path / "intervals.csv").set_index(["metric", "concept"])
     metrics = collect(files).groupby(["metric", "concept"])["value"].mean()
     assert set(collected.index) == {("accuracy", concept) for concept in ("all", *CONCEPTS)}
     for key in collected.index:

@@ -1,6 +1,5 @@
 import numpy as np
 import pandas as pd
-import pytest
 
 from gpca.evaluation.measures import TIDY_COLUMNS
 from gpca.experiments.confusions import MOST, draw_confusions, pooled_confusions
@@ -22,14 +21,6 @@ def tidy(rows):
     return pd.DataFrame(rows, columns=list(TIDY_COLUMNS))
 
 
-@pytest.fixture
-def metrics():
-    """All explainers on two sources and two seeds."""
-    random = np.random.default_rng(0)
-    axes = [(source, name, seed) for source in ("cup", "ycb") for name in EXPLAINERS for seed in (0, 1)]
-    return tidy([row for s, name, seed in axes for row in records(s, name, random.integers(0, 9, (3, 4)), seed)])
-
-
 def test_confusions_are_pooled_over_sources_and_seeds_in_the_order_of_the_concepts():
     metrics = tidy([*records("ycb", "shap", COUNTS, 0), *records("cup", "shap", COUNTS, 1)])
     accuracies = tidy([("attribution", "ycb", "shap", "accuracy", "all", 0, 0.5)])
@@ -47,7 +38,11 @@ def test_a_matrix_shows_the_share_of_each_true_concept():
     assert [text.get_text() for text in panel.texts] == shown
 
 
-def test_the_first_named_are_drawn_first_and_no_more_than_fit(metrics):
+def test_the_first_named_are_drawn_first_and_no_more_than_fit():
+    # All explainers on two sources and two seeds.
+    random = np.random.default_rng(0)
+    axes = [(source, name, seed) for source in ("cup", "ycb") for name in EXPLAINERS for seed in (0, 1)]
+    metrics = tidy([row for s, name, seed in axes for row in records(s, name, random.integers(0, 9, (3, 4)), seed)])
     figure = draw_confusions(metrics, EXPLAINERS, ("explainer_5", "absent", "explainer_2"), "both")
     shown = [panel.get_title().replace("\n", " ") for panel in figure.axes]
     assert len(shown) == MOST

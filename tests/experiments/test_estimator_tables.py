@@ -45,13 +45,6 @@ def intervals():
     )
 
 
-@pytest.fixture
-def seconds():
-    return pd.DataFrame(
-        [(name, method, 0.02) for name in ESTIMATES for method in METHODS], columns=["estimator", "method", "seconds"]
-    )
-
-
 def test_an_estimator_is_judged_by_what_it_models_and_states_stand_apart(intervals):
     table = table12_uncertainty(RUN, intervals)
     names = [tuple(key for key, _ in labels) for labels in table.rows]
@@ -84,7 +77,10 @@ def test_every_estimator_stands_beside_every_reference_and_these_beside_each_oth
     assert table.printed()["heads"][-1] == "True pose: coverage (%)"
 
 
-def test_an_alarm_stands_beside_the_gates(intervals, seconds):
+def test_an_alarm_stands_beside_the_gates(intervals):
+    seconds = pd.DataFrame(
+        [(name, method, 0.02) for name in ESTIMATES for method in METHODS], columns=["estimator", "method", "seconds"]
+    )
     table = table12_failures(RUN, intervals, seconds)
     assert [labels[1][0] for labels in table.rows] == [*ESTIMATES, *GATES] * 2
     assert table.rows[0][0] == ("point_to_point", f"{method_entry(METHODS[0]).title}: 32 succeeded, 12 failed")

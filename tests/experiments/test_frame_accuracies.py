@@ -85,13 +85,9 @@ def files(tmp_path):
     return said, poses
 
 
-@pytest.fixture
-def found(files, tmp_path):
+def test_values_are_those_of_the_metrics_over_scenes_and_differences_are_paired(files, tmp_path):
     write_csv(tmp_path / "intervals.csv", collect_intervals(RUN, *files), form=None)
-    return read_clustered(tmp_path / "intervals.csv").set_index(["table", "method", "metric", "concept"])
-
-
-def test_values_are_those_of_the_metrics_over_scenes_and_differences_are_paired(files, found):
+    found = read_clustered(tmp_path / "intervals.csv").set_index(["table", "method", "metric", "concept"])
     metrics = collect(RUN, *files)
     metrics = metrics[(metrics["metric"] == "accuracy")].groupby(["table", "method", "metric", "concept"])["value"]
     accuracies = found.xs("accuracy", level="metric", drop_level=False)

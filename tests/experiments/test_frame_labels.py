@@ -17,9 +17,16 @@ ACCURACIES = {
 }  # fmt: skip
 
 
-@pytest.fixture
-def label_files(tmp_path):
-    paths = []
+def value(found, **wanted):
+    rows = pd.concat(found)
+    for column, text in wanted.items():
+        rows = rows[rows[column] == text]
+    [number] = rows["value"]
+    return number
+
+
+def test_labels_are_counted_to_every_target_and_the_rest_stands_once(tmp_path):
+    label_files = []
     for strategy in ("bald_kmeans", "random"):
         path = tmp_path / f"frame_labels/real_rgbd/{strategy}/seed0.csv"
         path.parent.mkdir(parents=True)
@@ -32,19 +39,7 @@ def label_files(tmp_path):
             if of == strategy
         }
         write_curves(path, curves, POOL_COLUMNS)
-        paths.append(path)
-    return paths
-
-
-def value(found, **wanted):
-    rows = pd.concat(found)
-    for column, text in wanted.items():
-        rows = rows[rows[column] == text]
-    [number] = rows["value"]
-    return number
-
-
-def test_labels_are_counted_to_every_target_and_the_rest_stands_once(label_files):
+        label_files.append(path)
     found = collect_labels(label_files, (0.65, 0.7))
     labels = {"method": "bald_kmeans", "metric": "labels_to_target"}
     assert value(found, table="active_learning/dgcnn/70", **labels) == 4

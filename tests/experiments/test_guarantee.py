@@ -31,12 +31,8 @@ def run(*explainers):
 
 
 @pytest.fixture(scope="module")
-def scored():
-    return scored_samples()
-
-
-@pytest.fixture(scope="module")
-def files(scored, tmp_path_factory):
+def files(tmp_path_factory):
+    scored = scored_samples()
     path = tmp_path_factory.mktemp("scores") / "reenact.csv"
     scored.save(path)
     return [path]

@@ -17,20 +17,14 @@ def brick(objects):
     return Judge(objects, 0)
 
 
-def test_the_true_pose_is_off_by_nothing(brick):
+def test_errors_are_in_diameters_and_radians_up_to_symmetry(brick):
     errors = brick(TRUE, TRUE)
     assert errors.keys() == {"add_relative", "rotation_error_rad", "translation_error"}
     assert max(errors.values()) < 1e-6
-
-
-def test_a_shift_is_told_in_diameters(brick):
     errors = brick(motion(0, 0, 0, 0.01, 0, 0) @ TRUE, TRUE)
     assert errors["translation_error"] == pytest.approx(0.01)
     assert errors["rotation_error_rad"] == pytest.approx(0, abs=1e-6)
     assert 0 < errors["add_relative"] < 0.01  # to the nearest point of a symmetric object
-
-
-def test_a_symmetric_object_turned_over_is_where_it_was(brick):
     assert brick.symmetric
     errors = brick(motion(0, 0, np.pi, 0, 0, 0) @ TRUE, TRUE)
     assert errors["rotation_error_rad"] == pytest.approx(0, abs=1e-6)

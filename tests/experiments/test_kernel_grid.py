@@ -6,14 +6,7 @@ import pytest
 from gpca.declarations.plan import Run
 from gpca.errors import InputError
 from gpca.evaluation.measures import COLUMNS
-from gpca.experiments.kernel_grid import (
-    COLORS,
-    PRINTED_MARKERS,
-    kernel_learning_curves,
-    printed_accuracies,
-    setting_name,
-    table4_kernels,
-)
+from gpca.experiments import kernel_grid
 from gpca.steps.kernel_grid import GRID_COLUMNS, PRINTED
 
 
@@ -46,13 +39,13 @@ def intervals(sources=("ycb", "linemod"), seeds=3):
     keys = ["source", "kernel", "learning_rate", "iterations"]
     for (source, *setting), mean in grid(sources, seeds).groupby(keys, sort=False).mean().iterrows():
         for measure in ("accuracy", "confidence", "ece", "nll"):
-            own = ("kernels", source, setting_name(*setting), measure, "all", seeds, 11, seeds * 200)
+            own = ("kernels", source, kernel_grid.setting_name(*setting), measure, "all", seeds, 11, seeds * 200)
             rows.append((*own, mean[measure], mean[measure] - 0.05, mean[measure] + 0.02))
     return pd.DataFrame(rows, columns=[*COLUMNS])
 
 
 def test_table4_has_the_papers_rows_and_a_column_per_source():
-    table = table4_kernels(REAL, intervals())
+    table = kernel_grid.table4_kernels(REAL, intervals())
     assert [tuple(key for key, _ in labels) for labels in table.rows] == [
         (kernel, f"{rate:g}", str(iterations)) for kernel, rate, iterations in PRINTED
     ]
@@ -63,34 +56,34 @@ def test_table4_has_the_papers_rows_and_a_column_per_source():
 
 def test_rows_and_sources_that_were_not_fitted_are_left_out():
     part = intervals(("ycb",))
-    table = table4_kernels(REAL, part[~part["method"].str.endswith("-200")])
+    table = kernel_grid.table4_kernels(REAL, part[~part["method"].str.endswith("-200")])
     assert list(table.columns) == ["ycb"]
     assert len(table.rows) == 1
-    text = table4_kernels(REAL, intervals(seeds=1)).markdown()
+    text = kernel_grid.table4_kernels(REAL, intervals(seeds=1)).markdown()
     assert "85.0 (80.0 to 87.0)" in text and "Over 1 seed, 200 test samples each" in text
 
 
 def test_stand_ins_are_said_and_nothing_to_show_is_a_fault():
-    table = table4_kernels(run(stand_in=True), intervals())
+    table = kernel_grid.table4_kernels(run(stand_in=True), intervals())
     assert "on procedural stand-ins" in table.caption
     with pytest.raises(InputError, match="has nothing to show"):
-        table4_kernels(REAL, intervals(("cups",)))
+        kernel_grid.table4_kernels(REAL, intervals(("cups",)))
 
 
 def test_the_figure_has_the_accuracies_that_the_paper_prints():
-    printed = printed_accuracies("linemod")
+    printed = kernel_grid.printed_accuracies("linemod")
     assert set(printed) == set(PRINTED)
     assert printed["rbf", 0.001, 200] == 50.6
-    figure = kernel_learning_curves(LINEMOD, grid())
+    figure = kernel_grid.kernel_learning_curves(LINEMOD, grid())
     drawn = [
-        sorted(line.get_ydata()[0] for line in panel.get_lines() if line.get_marker() in PRINTED_MARKERS)
+        sorted(line.get_ydata()[0] for line in panel.get_lines() if line.get_marker() in kernel_grid.PRINTED_MARKERS)
         for panel in figure.axes
     ]
     assert drawn == [sorted(printed.values()), []]  # accuracies; the paper prints no confidence
     # A kernel whose curve coincides with another's shows below it.
     lines = [line for line in figure.axes[0].get_lines() if len(line.get_xdata()) > 1]
     widths = {line.get_color(): line.get_linewidth() for line in lines}
-    assert widths[COLORS["matern32"]] > widths[COLORS["rbf"]]
-    assert lines[0].get_color() == COLORS["matern32"]
+    assert widths[kernel_grid.COLORS["matern32"]] > widths[kernel_grid.COLORS["rbf"]]
+    assert lines[0].get_color() == kernel_grid.COLORS["matern32"]
     with pytest.raises(InputError, match="have no results for these sources"):
-        kernel_learning_curves(run(cups="Cups"), grid())
+        kernel_grid.kernel_learning_curves(run(cups="Cups"), grid())

@@ -33,15 +33,11 @@ def rigid(rotvec, translation):
 
 
 @pytest.fixture(scope="module")
-def clouds():
-    """Points of two boxes, relative to their diameters."""
-    boxes = [trimesh.creation.box(extents) for extents in ((3, 2, 1), (6, 1, 1))]
-    return [np.asarray(box.sample(2000, seed=1)) / np.linalg.norm(box.extents) for box in boxes]
-
-
-@pytest.fixture(scope="module")
-def files(clouds, tmp_path_factory):
+def files(tmp_path_factory):
     """An objects and a registrations file, 12 test samples of each object; also the sources before ICP."""
+    # Points of two boxes, relative to their diameters.
+    boxes = [trimesh.creation.box(extents) for extents in ((3, 2, 1), (6, 1, 1))]
+    clouds = [np.asarray(box.sample(2000, seed=1)) / np.linalg.norm(box.extents) for box in boxes]
     folder = tmp_path_factory.mktemp("concepts")
     random = np.random.default_rng(5)
     points_m = np.concatenate([cloud * d for cloud, d in zip(clouds, DIAMETERS_M, strict=True)]).astype(np.float32)

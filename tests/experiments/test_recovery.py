@@ -50,17 +50,13 @@ def intervals():
     return pd.DataFrame(rows, columns=[*INTERVALS]).assign(against="", other="")
 
 
-@pytest.fixture
-def differences():
+def test_table8_pools_the_seeds_and_holds_the_bounds_over_tables(metrics, intervals):
     keys = product(("recovered_within_1", "recovered_within_3"), ("sequence", "error"))
     rows = [
         ("recovery", "recovery", "gpca", metric, "all", against, "random", 2, 10, 24, 0.125 * n, -0.1, 0.4)
         for n, (metric, against) in enumerate(keys)
     ]
-    return pd.DataFrame(rows, columns=[*KEYS, *AGAINST, *NUMBERS])
-
-
-def test_table8_pools_the_seeds_and_holds_the_bounds_over_tables(metrics, intervals, differences):
+    differences = pd.DataFrame(rows, columns=[*KEYS, *AGAINST, *NUMBERS])
     table = table8_recovery(run_of(), metrics, intervals, differences, {"gpca": 0.25})
     assert [labels[0][0] for labels in table.rows] == ["gpca", "random"]
     cell = table.cells[0, "recovered_within_1"]

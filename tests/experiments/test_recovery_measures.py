@@ -7,13 +7,7 @@ from gpca.causes.policy import NOTHING, QUEUE, TREATMENTS
 from gpca.declarations.plan import Run
 from gpca.errors import InputError
 from gpca.evaluation.measures import read_clustered
-from gpca.experiments.recovery_measures import (
-    collect,
-    collect_differences,
-    collect_intervals,
-    policy_metrics,
-    read_recovery,
-)
+from gpca.experiments import recovery_measures
 from gpca.io.csv_file import write_csv
 from gpca.pairs.perturbation import CONCEPTS
 
@@ -58,35 +52,24 @@ EPISODES = (
 )
 
 
-@pytest.fixture
-def files(tmp_path):
-    paths = [tmp_path / f"seed{seed}.csv" for seed in (0, 1)]
-    write_csv(paths[0], rows_of(*EPISODES))
-    write_csv(paths[1], rows_of(EPISODES[0], EPISODES[0]))
-    return paths
-
-
-def test_the_metrics_of_a_policy_by_hand():
-    values = policy_metrics(rows_of(*EPISODES), COSTS, 3)
+def test_the_metrics_of_a_policy_by_hand_count_apart_what_did_not_fail():
+    values = recovery_measures.policy_metrics(rows_of(*EPISODES), COSTS, 3)
     assert [values[f"recovered_within_{k}"] for k in (1, 2, 3)] == [0.25, 0.5, 0.5]
     assert values["queued"] == 0.25
     assert values["cost"] == pytest.approx((3 * 0.02 + 2 * 0.01 + 0.03) / 4)
     assert values["episodes"] == 4
     assert values["tries"] == 60
-
-
-def test_what_did_not_fail_counts_apart():
     fine = rows_of(("noise", ["denoise"], False), ("pose", [NOTHING], False)).assign(failed=False)
-    values = policy_metrics(pd.concat([rows_of(*EPISODES), fine]), COSTS, 3)
+    values = recovery_measures.policy_metrics(pd.concat([rows_of(*EPISODES), fine]), COSTS, 3)
     assert (values["nominal"], values["acted_nominal"], values["episodes"]) == (2, 0.5, 4)
-    left = policy_metrics(rows_of(("pose", [NOTHING], False)), COSTS, 3)
+    left = recovery_measures.policy_metrics(rows_of(("pose", [NOTHING], False)), COSTS, 3)
     assert (left["left_alone"], left["queued"], left["recovered_within_3"]) == (1, 0, 0)
 
 
-def test_faulty_files_are_refused(files, tmp_path):
+def test_faulty_files_are_refused(tmp_path):
     write_csv(tmp_path / "less.csv", rows_of(EPISODES[0]).drop(columns="tries"))
     with pytest.raises(InputError, match="column 'tries' is missing"):
-        read_recovery(tmp_path / "less.csv")
+        recovery_measures.read_recovery(tmp_path / "less.csv")
 
 
 TAKEN = {  # policy -> of nine failures, its actions; one that ends with "!" recovers the pose
@@ -110,22 +93,13 @@ def rows_of_taken(actions):
     return pd.DataFrame(rows).assign(error_before=0.2, error_after=0.1, tries=5)
 
 
-@pytest.fixture
-def taken_files(tmp_path):
-    paths = [tmp_path / f"seed{seed}.csv" for seed in range(2)]
-    for path in paths:
+def test_shares_are_those_of_the_metrics(tmp_path):
+    taken_files = [tmp_path / f"seed{seed}.csv" for seed in range(2)]
+    for path in taken_files:
         write_csv(path, rows_of_taken(TAKEN))
-    return paths
-
-
-@pytest.fixture
-def shares(taken_files, tmp_path):
-    write_csv(tmp_path / "intervals.csv", collect_intervals(run_of(budget=2), taken_files), form=None)
-    return read_clustered(tmp_path / "intervals.csv").set_index(["method", "metric", "concept"])
-
-
-def test_shares_are_those_of_the_metrics(taken_files, shares):
-    metrics = collect(run_of(budget=2), taken_files)
+    write_csv(tmp_path / "intervals.csv", recovery_measures.collect_intervals(run_of(budget=2), taken_files), form=None)
+    shares = read_clustered(tmp_path / "intervals.csv").set_index(["method", "metric", "concept"])
+    metrics = recovery_measures.collect(run_of(budget=2), taken_files)
     for policy, metric, concept in shares.index:
         wide = metrics.query("method == @policy and concept == @concept").pivot(
             index="seed", columns="metric", values="value"
@@ -165,18 +139,15 @@ def measured_differences(tmp_path):
     paths = [tmp_path / f"seed{seed}.csv" for seed in range(4)]
     for path in paths:
         write_csv(path, rows_solved(SOLVED))
-    write_csv(tmp_path / "differences.csv", collect_differences(run_of(budget=2), paths), form=None)
+    write_csv(tmp_path / "differences.csv", recovery_measures.collect_differences(run_of(budget=2), paths), form=None)
     return read_clustered(tmp_path / "differences.csv").set_index(["method", "metric", "against"])
 
 
-def test_differences_are_paired_and_of_the_same_failures(measured_differences):
+def test_differences_are_paired_and_from_the_best_sequence_of_as_many_actions(measured_differences):
     row = measured_differences.loc["gpca_acting", "recovered_within_1", "error"]
     assert (row["other"], row["seeds"], row["samples"]) == ("error_only_acting", 4, 16)
     assert row["value"] == pytest.approx(2 / 4)
     assert 0 < row["low"] < row["value"] < row["high"] <= 1
-
-
-def test_the_best_sequence_is_the_best_by_that_number_of_actions(measured_differences):
     for k, best in ((1, "always_denoise"), (2, "sequence_new_view_denoise")):
         of_number = measured_differences.xs((f"recovered_within_{k}", "sequence"), level=("metric", "against"))
         assert set(of_number["other"]) == {best}
@@ -190,5 +161,5 @@ def test_who_must_recognize_failures_is_compared_with_who_must_as_well_each_time
     assert row["low"] < 0 < row["high"]  # never of no width
     assert "error_only" not in measured_differences.xs("error", level="against").index
     paths = [tmp_path / f"seed{seed}.csv" for seed in range(4)]
-    write_csv(tmp_path / "again.csv", collect_differences(run_of(budget=2), paths), form=None)
+    write_csv(tmp_path / "again.csv", recovery_measures.collect_differences(run_of(budget=2), paths), form=None)
     assert (tmp_path / "again.csv").read_bytes() == (tmp_path / "differences.csv").read_bytes()

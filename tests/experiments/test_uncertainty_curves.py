@@ -3,13 +3,7 @@ import pytest
 
 from gpca.attribution.learner_predictions import sets_of
 from gpca.errors import InputError
-from gpca.experiments.uncertainty_curves import (
-    coverage_risk,
-    distance_curve,
-    read_with_distances,
-    reliability,
-    uncertainty_vs_distance,
-)
+from gpca.experiments import uncertainty_curves
 from gpca.explainers.registry import explainer_entry
 from gpca.io.csv_file import write_csv
 from gpca.pairs.shifted_sets import DISTANCES
@@ -28,7 +22,7 @@ MAKE = {
 }
 LEARNERS = dict.fromkeys([*MAKE, "learner_forest"])  # the last one has no predictions
 RUN = run_with(sources=SOURCES, learners=LEARNERS)
-DRAW = [coverage_risk, reliability, uncertainty_vs_distance]
+DRAW = [uncertainty_curves.coverage_risk, uncertainty_curves.reliability, uncertainty_curves.uncertainty_vs_distance]
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +37,7 @@ def learned(tmp_path_factory):
         for name, make in MAKE.items():
             predictions.append(folder / "learners" / source / name / "seed0.csv")
             write_csv(predictions[-1], predict_sets(make, sets()))
-    return read_with_distances([*predictions, *set_files])
+    return uncertainty_curves.read_with_distances([*predictions, *set_files])
 
 
 @pytest.mark.parametrize("draw", DRAW)
@@ -60,7 +54,7 @@ def test_without_predictions_nothing_is_drawn(learned, draw):
 
 
 def test_a_panel_says_of_how_many_samples_it_is_and_lines_have_bands(learned):
-    figure = uncertainty_vs_distance(RUN, learned)
+    figure = uncertainty_curves.uncertainty_vs_distance(RUN, learned)
     names = ("in_distribution", "in_distribution+severity", "seen_objects+objects")  # There is no other source.
     assert len(figure.axes) == len(names) * len(SOURCES)
     for row, name in enumerate(names):
@@ -73,11 +67,11 @@ def test_a_panel_says_of_how_many_samples_it_is_and_lines_have_bands(learned):
 
 
 def test_classifiers_with_a_look_of_their_own_are_drawn_alone(learned):
-    figure = coverage_risk(RUN, learned)
+    figure = uncertainty_curves.coverage_risk(RUN, learned)
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["GP-CA (trained longer)"]
     assert [line.get_color() for line in figure.axes[0].get_lines()] == [style.BLUE]
     others = {key: rows for key, rows in learned.items() if key[1] != "gpca"}
-    named = [text.get_text() for text in coverage_risk(RUN, others).legends[0].get_texts()]
+    named = [text.get_text() for text in uncertainty_curves.coverage_risk(RUN, others).legends[0].get_texts()]
     assert named == ["k nearest embeddings", "Logistic regression"]
 
 
@@ -86,7 +80,7 @@ def test_curves_of_risk_start_at_zero_and_a_panel_without_errors_says_so(learned
         key: rows.assign(concept_predicted=rows["concept_true"] if key[0] == "cups" else "none", abstained=False)
         for key, rows in learned.items()
     }
-    cups, parts = coverage_risk(RUN, wrong).axes[:2]
+    cups, parts = uncertainty_curves.coverage_risk(RUN, wrong).axes[:2]
     assert [text.get_text() for text in cups.texts] == ["no errors"]
     assert not parts.texts
     assert all(line.get_xdata()[0] == 0 for line in parts.get_lines())
@@ -94,7 +88,7 @@ def test_curves_of_risk_start_at_zero_and_a_panel_without_errors_says_so(learned
 
 def test_bins_of_distance_hold_equally_many_samples():
     rows = pd.DataFrame({DISTANCES[0]: range(20, 0, -1), "max_score": [0.1] * 10 + [0.5] * 10})
-    distance, score, half = distance_curve([rows[:5], rows[5:]])
+    distance, score, half = uncertainty_curves.distance_curve([rows[:5], rows[5:]])
     assert distance.tolist() == [1.5 + 2 * n for n in range(10)]
     assert score.tolist() == pytest.approx([0.5] * 5 + [0.1] * 5)
     assert half.tolist() == pytest.approx([0.0] * 10)

@@ -2,8 +2,6 @@
 
 from types import SimpleNamespace
 
-import pytest
-
 from gpca.comparison.verdicts import PAPER_TOO_WIDE, judged_once
 from gpca.experiments import verdict_map
 from gpca.process.code_files import ROOT
@@ -13,12 +11,8 @@ from ..figures import assert_words_are_large_enough_and_inside, words_of
 RUN = SimpleNamespace(stand_ins=lambda: "")
 
 
-@pytest.fixture(scope="module")
-def comparison():
-    return verdict_map.read_comparison(ROOT / "results/reference/full/comparison.csv")
-
-
-def test_every_mean_has_a_cell_with_its_difference_and_those_that_no_run_decides_are_apart(comparison):
+def test_every_mean_has_a_cell_with_its_difference_and_those_that_no_run_decides_are_apart():
+    comparison = verdict_map.read_comparison(ROOT / "results/reference/full/comparison.csv")
     figure = verdict_map.verdicts(RUN, comparison)
     assert_words_are_large_enough_and_inside(figure)
     words = words_of(figure)

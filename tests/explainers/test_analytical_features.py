@@ -30,14 +30,11 @@ def test_a_line_is_linear_a_disc_planar_and_a_ball_neither():
     assert shape_at(octahedron, [0, 0, 0], 6)[1:] == [pytest.approx(0), pytest.approx(0)]
 
 
-def test_an_ellipsoid_of_points_has_the_eigenvalue_ratios_of_its_half_axes():
+def test_a_shape_has_the_eigenvalue_ratios_of_its_points_and_is_finite_for_coinciding_or_few():
     points = np.vstack([np.diag([3.0, 2.0, 1.0]), -np.diag([3.0, 2.0, 1.0])])
     normal, planarity, linearity = shape_at(points, [0, 0, 0], 6)
     assert (planarity, linearity) == (pytest.approx((4 - 1) / 9), pytest.approx((9 - 4) / 9))
     assert np.abs(normal) == pytest.approx([0, 0, 1])
-
-
-def test_coinciding_and_few_points_have_a_finite_shape():
     assert shape_at(np.zeros((20, 3)), [0, 0, 0], 16)[1:] == [0, 0]
     assert np.isfinite(shape_at(np.eye(3), [0, 0, 0], 16)[1])
 

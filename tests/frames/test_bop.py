@@ -11,15 +11,7 @@ import pytest
 from PIL import Image
 
 from gpca.errors import InputError
-from gpca.frames.bop import (
-    Annotation,
-    Frame,
-    TooFewPoints,
-    back_project,
-    measured_points,
-    read_frames,
-    without_background,
-)
+from gpca.frames import bop
 from gpca.frames.dataset import Dataset, read_models
 
 from ..hostile import refusal
@@ -33,24 +25,24 @@ def test_a_pixel_is_projected_back_by_hand():
     depth_m = np.zeros((4, 5), np.float32)
     depth_m[1, 3] = 2.0
     camera_3_3 = np.array([[10.0, 0, 2], [0, 20, 3], [0, 0, 1]])
-    points, pixels = back_project(depth_m, np.ones((4, 5), bool), camera_3_3)
+    points, pixels = bop.back_project(depth_m, np.ones((4, 5), bool), camera_3_3)
     assert points.tolist() == [[(3 - 2) / 10 * 2, (1 - 3) / 20 * 2, 2.0]]
     assert pixels.tolist() == [[3, 1]]
 
 
 def test_what_lies_a_diameter_behind_the_object_is_not_of_it(tmp_path):
     save(tmp_path / "mask.png", np.full((20, 20), 255, np.uint8))
-    frame = Frame(0, 0, np.array([[100.0, 0, 10], [0, 100, 10], [0, 0, 1]]), 1.0, None, None, ())
+    frame = bop.Frame(0, 0, np.array([[100.0, 0, 10], [0, 100, 10], [0, 0, 1]]), 1.0, None, None, ())
     depth_m = np.full((20, 20), 1.0, np.float32)
     depth_m[:, :3] = 1.5  # seen past its edge
-    annotation = Annotation(1, np.eye(4), tmp_path / "mask.png", "scene_gt.json")
-    points, _ = without_background(*measured_points(frame, annotation, depth_m), annotation, diameter_m=0.3)
+    annotation = bop.Annotation(1, np.eye(4), tmp_path / "mask.png", "scene_gt.json")
+    points, _ = bop.without_background(*bop.measured_points(frame, annotation, depth_m), annotation, diameter_m=0.3)
     assert len(points) == 20 * 17
     assert points[:, 2].max() == 1.0
 
 
 def test_frames_are_found_in_any_archive_of_the_dataset_and_may_be_a_draw(scenes, tmp_path):
-    assert len(read_frames([tmp_path, scenes])) == 6
+    assert len(bop.read_frames([tmp_path, scenes])) == 6
     few = Dataset("tiny", (scenes,), most_frames=3).frames()
     assert [(frame.scene, frame.image) for frame in few] == [
         (frame.scene, frame.image) for frame in Dataset("tiny", (scenes,), most_frames=3).frames()
@@ -62,7 +54,7 @@ def test_colour_may_be_jpeg(damaged):
     for path in (damaged / TABLE / "rgb").iterdir():
         Image.open(path).save(path.with_suffix(".jpg"))
         path.unlink()
-    assert {frame.color.suffix for frame in read_frames([damaged])} == {".png", ".jpg"}
+    assert {frame.color.suffix for frame in bop.read_frames([damaged])} == {".png", ".jpg"}
 
 
 def test_an_object_of_which_little_was_measured_is_left_out_and_named(tiny, damaged, tmp_path, capsys):
@@ -74,9 +66,9 @@ def test_an_object_of_which_little_was_measured_is_left_out_and_named(tiny, dama
     assert f"skipped: {mask}: has depth at" in (told := capsys.readouterr().err)
     assert "64 are needed" in told
     assert len(instances) == len(tiny[0]) - 1
-    frame = next(frame for frame in read_frames([damaged]) if (frame.scene, frame.image) == (1, 0))
-    with pytest.raises(TooFewPoints, match="000000_000001"):
-        measured_points(frame, frame.annotations[1], frame.depth_m())
+    frame = next(frame for frame in bop.read_frames([damaged]) if (frame.scene, frame.image) == (1, 0))
+    with pytest.raises(bop.TooFewPoints, match="000000_000001"):
+        bop.measured_points(frame, frame.annotations[1], frame.depth_m())
 
 
 def edited(name, change):

@@ -70,14 +70,11 @@ def pose(x_m, z_m=1.0):
     return T
 
 
-def test_every_estimator_that_spoke_of_an_object_has_an_estimate():
+def test_every_estimator_that_spoke_has_an_estimate_but_elsewhere_it_is_of_another_equal_object():
     estimators = {"b": {(1, 2, 3): [pose(0.02)]}, "a": {(1, 2, 3): [pose(0.01)]}, "c": {}}
     found = estimates_of(estimators, (1, 2, 3), True, SEEN)
     assert [(name, T[0, 3]) for name, T in found] == [("a", 0.01), ("b", 0.02)]
     assert estimates_of(estimators, (1, 2, 4), True, SEEN) == []
-
-
-def test_among_equal_objects_an_estimate_elsewhere_is_of_another_one():
     estimators = {"a": {(1, 2, 3): [pose(0.3)]}}
     assert estimates_of(estimators, (1, 2, 3), False, SEEN) == []
     assert estimates_of(estimators, (1, 2, 3), True, SEEN)  # the only one of its kind: a bad estimate is one too

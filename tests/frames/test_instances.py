@@ -72,14 +72,11 @@ def test_a_faulty_file_is_refused(tiny, tmp_path, name, change, expected):
         Instances.load(tmp_path / "instances.npz")
 
 
-def test_a_scan_is_simplified_and_keeps_its_size():
+def test_a_scan_is_simplified_and_keeps_its_size_and_a_cloud_of_points_is_refused():
     ball = trimesh.creation.icosphere(subdivisions=3, radius=0.05)
     simple = simplified(Surface("ball", ball.vertices, ball.faces), most_faces=200)
     assert len(simple.triangles) == 200
     assert np.linalg.norm(simple.vertices_m, axis=1) == pytest.approx(0.05, rel=0.05)
     assert simplified(Surface("ball", ball.vertices, ball.faces)).faces is ball.faces
-
-
-def test_a_camera_sees_no_cloud_of_points():
     with pytest.raises(InputError, match="object 'cup': is a point cloud, but the virtual camera needs a mesh"):
         simplified(Surface("cup", np.zeros((70, 3)), None))

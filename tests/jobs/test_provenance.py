@@ -13,9 +13,8 @@ from gpca.jobs.provenance import record_provenance, sha256_of_settings
 from gpca.process.processor import describe
 
 
-@pytest.fixture
-def record(tmp_path, monkeypatch):
-    """The sidecar of a block that took 20 ms and had one input."""
+def test_the_sidecar_says_where_a_result_comes_from(monkeypatch, tmp_path):
+    # The sidecar of a block that took 20 ms and had one input.
     monkeypatch.setenv("GPCA_CONFIG_SHA256", '{"seeds": "c0ffee"}')
     source, outputs = tmp_path / "in.npz", [tmp_path / "out.npz", tmp_path / "out.csv"]
     source.write_bytes(b"data")
@@ -25,10 +24,7 @@ def record(tmp_path, monkeypatch):
         assert not list(tmp_path.glob("*.json"))
     sidecars = [output.with_name(output.name + ".provenance.json").read_text() for output in outputs]
     assert sidecars[0] == sidecars[1]
-    return json.loads(sidecars[0])
-
-
-def test_the_sidecar_says_where_a_result_comes_from(record, tmp_path):
+    record = json.loads(sidecars[0])
     assert record["inputs_sha256"] == {str(tmp_path / "in.npz"): hashlib.sha256(b"data").hexdigest()}
     assert record["settings"] == {"points": 5, "options": {"k": 3}}
     assert record["settings_sha256"] == sha256_of_settings({"options": {"k": 3}, "points": 5})
@@ -51,13 +47,12 @@ def test_a_failed_block_leaves_no_sidecar(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.fixture
-def git_at(monkeypatch):
-    """Makes a package in a folder, and a commit there of all files that are given."""
+def test_the_code_version_tells_the_commit_and_whether_it_was_edited(monkeypatch, tmp_path):
+    # Makes a package in a folder, and a commit there of all files that are given.
     if shutil.which("git") is None:
         pytest.skip("needs git")
 
-    def make(package, repository, *kept):
+    def git_at(package, repository, *kept):
         (package / "gpca").mkdir(parents=True)
         (package / "gpca/__init__.py").write_text("one = 1\n")
         identity = ["-c", "user.name=A", "-c", "user.email=a@b.org"]
@@ -65,10 +60,6 @@ def git_at(monkeypatch):
             subprocess.run(["git", "-C", repository, *command], check=True, capture_output=True)
         monkeypatch.setattr(provenance, "ROOT", package)
 
-    return make
-
-
-def test_the_code_version_tells_the_commit_and_whether_it_was_edited(git_at, tmp_path):
     git_at(tmp_path, tmp_path, "gpca")
     head = subprocess.run(["git", "-C", tmp_path, "rev-parse", "HEAD"], capture_output=True, text=True, check=True)
     assert provenance._code_version() == {"version": __version__, "commit": head.stdout.strip(), "dirty": False}
@@ -81,14 +72,11 @@ def test_the_code_version_tells_the_commit_and_whether_it_was_edited(git_at, tmp
 UNKNOWN = {"version": __version__, "commit": None, "dirty": None}
 
 
-def test_no_checkout_and_no_git_are_no_fault(tmp_path, monkeypatch):
+def test_without_a_checkout_git_or_a_lock_the_code_is_unknown(tmp_path, monkeypatch):
     monkeypatch.setattr(provenance, "ROOT", tmp_path)
     assert provenance._code_version() == UNKNOWN
     monkeypatch.setenv("PATH", str(tmp_path))
     assert provenance._code_version() == UNKNOWN
-
-
-def test_a_package_without_a_lock_beside_it_has_no_hash_of_one(tmp_path, monkeypatch):
     monkeypatch.setattr(provenance, "ROOT", tmp_path)
     with record_provenance([tmp_path / "out.csv"], [], {}):
         pass

@@ -8,14 +8,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from gpca.errors import InputError
-from gpca.objects.bop import (
-    angle_up_to_symmetry,
-    find_symmetries,
-    from_entry,
-    read_symmetries,
-    require_entry,
-    symmetric_turn,
-)
+from gpca.objects import bop
 from gpca.objects.canonical import canonical_cloud
 from gpca.objects.surface import Surface
 
@@ -37,23 +30,17 @@ def folder(tmp_path):
     return tmp_path / "toy"
 
 
-def test_all_models_in_metres(folder):
-    found = list(from_entry({}, folder))
+def test_all_models_or_those_that_are_listed_are_read_in_metres(folder):
+    found = list(bop.from_entry({}, folder))
     assert [surface.name for surface in found] == ["obj_000001", "obj_000002", "obj_000010"]
     assert np.ptp(found[0].vertices_m, axis=0) == pytest.approx([0.031, 0.04, 0.12])
-
-
-def test_folder_of_the_models_or_above_an_unpacked_set(folder):
     for place in (folder / "models", folder.parent):
-        assert len(list(from_entry({}, place))) == 3
-
-
-def test_listed_objects_only(folder):
-    found = list(from_entry({"objects": [10, 1]}, folder))
+        assert len(list(bop.from_entry({}, place))) == 3
+    found = list(bop.from_entry({"objects": [10, 1]}, folder))
     assert [surface.name for surface in found] == ["obj_000001", "obj_000010"]
     with pytest.raises(InputError, match=r"obj_000003\.ply: no such model"):
-        list(from_entry({"objects": [1, 3]}, folder))
-    for read in (from_entry, require_entry):
+        list(bop.from_entry({"objects": [1, 3]}, folder))
+    for read in (bop.from_entry, bop.require_entry):
         with pytest.raises(InputError, match="objects: is an empty list; name the objects, or leave it out for all"):
             read({"objects": []}, folder)
 
@@ -61,7 +48,7 @@ def test_listed_objects_only(folder):
 def test_unit_is_checked_against_the_listed_diameter(folder):
     for unit in ("m", "cm"):
         with pytest.raises(InputError, match=rf"obj_000001\.ply: .* in unit {unit}, .*check unit"):
-            list(from_entry({"unit": unit}, folder))
+            list(bop.from_entry({"unit": unit}, folder))
 
 
 @pytest.mark.parametrize(("factor", "passes"), [(1.04, True), (1.06, False), (0.94, False)])
@@ -71,28 +58,28 @@ def test_tolerance_of_the_diameter(folder, factor, passes):
     info["2"]["diameter"] *= factor
     path.write_text(json.dumps(info))
     if passes:
-        assert len(list(from_entry({}, folder))) == 3
+        assert len(list(bop.from_entry({}, folder))) == 3
     else:
         with pytest.raises(InputError, match="obj_000002"):
-            list(from_entry({}, folder))
+            list(bop.from_entry({}, folder))
 
 
 @pytest.mark.parametrize("name", ["obj_1_0.ply", "obj_1٣.ply", "obj_000001_old.ply"])
 def test_a_model_without_a_plain_number_in_its_name(folder, name):
     (folder / "models" / name).write_bytes((folder / "models/obj_000001.ply").read_bytes())
     with pytest.raises(InputError, match=rf"{name}: is not named obj_\{{number\}}\.ply; name it like"):
-        list(from_entry({}, folder))
+        list(bop.from_entry({}, folder))
 
 
 def test_missing_and_empty_folder(folder, tmp_path):
     (folder / "models/models_info.json").unlink()
     with pytest.raises(InputError, match=r"models_info\.json: no such file"):
-        list(from_entry({}, folder))
+        list(bop.from_entry({}, folder))
     with pytest.raises(InputError, match="nowhere: no such folder"):
-        list(from_entry({}, tmp_path / "nowhere"))
+        list(bop.from_entry({}, tmp_path / "nowhere"))
     (tmp_path / "empty").mkdir()
     with pytest.raises(InputError, match="has no models"):
-        list(from_entry({}, tmp_path / "empty"))
+        list(bop.from_entry({}, tmp_path / "empty"))
 
 
 create = trimesh.creation
@@ -100,7 +87,7 @@ create = trimesh.creation
 
 def symmetries(mesh):
     points, _, diameter = canonical_cloud(Surface("object", mesh.vertices, mesh.faces), "tests", 4096)
-    return find_symmetries(points, diameter)
+    return bop.find_symmetries(points, diameter)
 
 
 def test_a_brick_may_be_turned_over_but_not_by_a_quarter():
@@ -127,9 +114,9 @@ def test_a_handle_takes_the_symmetry_away():
 
 def test_what_the_file_lists_counts_for_all_of_its_objects():
     info = {1: {"diameter": 1.0}, 2: {"diameter": 1.0, "symmetries_discrete": [[1]]}}
-    assert read_symmetries(info, 1) == {}
-    assert read_symmetries(info, 2) == {"symmetries_discrete": [[1]]}
-    assert read_symmetries({1: {"diameter": 1.0}}, 1) is None
+    assert bop.read_symmetries(info, 1) == {}
+    assert bop.read_symmetries(info, 2) == {"symmetries_discrete": [[1]]}
+    assert bop.read_symmetries({1: {"diameter": 1.0}}, 1) is None
 
 
 def turn(axis, angle_deg):
@@ -141,28 +128,25 @@ def discrete(*turns):
     return {"symmetries_discrete": [np.pad(R, (0, 1)).ravel().tolist() for R in turns]}
 
 
-def test_an_angle_without_symmetries_is_that_of_the_rotation():
-    assert angle_up_to_symmetry(turn([0, 0.6, 0.8], 70), {}) == pytest.approx(np.deg2rad(70))
-    assert angle_up_to_symmetry(np.eye(3), {}) == pytest.approx(0, abs=1e-7)
-
-
 def test_an_angle_is_counted_from_the_nearest_turn_that_changes_nothing():
+    assert bop.angle_up_to_symmetry(turn([0, 0.6, 0.8], 70), {}) == pytest.approx(np.deg2rad(70))
+    assert bop.angle_up_to_symmetry(np.eye(3), {}) == pytest.approx(0, abs=1e-7)
     square_bar = discrete(turn([0, 0, 1], 90), turn([1, 0, 0], 180))
     for angle, expected in ((80, 10), (-80, 10), (130, 40), (45, 45)):  # three quarters too, which no list has
-        assert angle_up_to_symmetry(turn([0, 0, 1], angle), square_bar) == pytest.approx(np.deg2rad(expected))
+        assert bop.angle_up_to_symmetry(turn([0, 0, 1], angle), square_bar) == pytest.approx(np.deg2rad(expected))
     over_a_diagonal = turn(np.array([1, 1, 0]) / 2**0.5, 180)  # the two after each other
-    assert angle_up_to_symmetry(over_a_diagonal, square_bar) == pytest.approx(0, abs=1e-6)
-    assert angle_up_to_symmetry(turn([1, 0, 0], 90), square_bar) == pytest.approx(np.pi / 2)
+    assert bop.angle_up_to_symmetry(over_a_diagonal, square_bar) == pytest.approx(0, abs=1e-6)
+    assert bop.angle_up_to_symmetry(turn([1, 0, 0], 90), square_bar) == pytest.approx(np.pi / 2)
 
 
 def test_turns_about_an_axis_of_revolution_do_not_count():
     cone = {"symmetries_continuous": [{"axis": [0.0, 0.0, 1.0], "offset": [0.0, 0.0, 0.0]}]}
     tilted = turn([1, 0, 0], 25)
-    angles = [angle_up_to_symmetry(tilted @ turn([0, 0, 1], angle), cone) for angle in (0, 77, 180)]
+    angles = [bop.angle_up_to_symmetry(tilted @ turn([0, 0, 1], angle), cone) for angle in (0, 77, 180)]
     np.testing.assert_allclose(angles, np.deg2rad(25))
     cylinder = cone | discrete(turn([1, 0, 0], 180))
-    assert angle_up_to_symmetry(turn([0, 1, 0], 170), cone) == pytest.approx(np.deg2rad(170))
-    assert angle_up_to_symmetry(turn([0, 1, 0], 170), cylinder) == pytest.approx(np.deg2rad(10))
+    assert bop.angle_up_to_symmetry(turn([0, 1, 0], 170), cone) == pytest.approx(np.deg2rad(170))
+    assert bop.angle_up_to_symmetry(turn([0, 1, 0], 170), cylinder) == pytest.approx(np.deg2rad(10))
 
 
 def test_the_closed_form_is_the_least_over_all_turns_about_the_axis():
@@ -171,7 +155,7 @@ def test_the_closed_form_is_the_least_over_all_turns_about_the_axis():
     random = np.random.default_rng(0)
     for R in Rotation.random(5, rng=random):
         least = min((R * Rotation.from_rotvec(angle * axis)).magnitude() for angle in np.linspace(0, 2 * np.pi, 2001))
-        assert angle_up_to_symmetry(R.as_matrix(), found) == pytest.approx(least, abs=1e-3)
+        assert bop.angle_up_to_symmetry(R.as_matrix(), found) == pytest.approx(least, abs=1e-3)
 
 
 def test_the_turn_that_leaves_the_least_angle_is_a_symmetry():
@@ -180,13 +164,13 @@ def test_the_turn_that_leaves_the_least_angle_is_a_symmetry():
     shapes["cylinder"] = cone | discrete(turn([1, 0, 0], 180))
     for name, symmetries in shapes.items():
         for R in Rotation.random(5, rng=np.random.default_rng(0)).as_matrix():
-            S = symmetric_turn(R, symmetries)
+            S = bop.symmetric_turn(R, symmetries)
             left = Rotation.from_matrix(R @ S).magnitude()
-            assert left == pytest.approx(angle_up_to_symmetry(R, symmetries), abs=1e-6), name
-            assert angle_up_to_symmetry(S, symmetries) == pytest.approx(0, abs=1e-6), name
+            assert left == pytest.approx(bop.angle_up_to_symmetry(R, symmetries), abs=1e-6), name
+            assert bop.angle_up_to_symmetry(S, symmetries) == pytest.approx(0, abs=1e-6), name
     ball = {"symmetries_continuous": [{"axis": [1.0, 0.0, 0.0]}, {"axis": [0.0, 1.0, 0.0]}]}
     R = turn([0, 0, 1], 50)
-    np.testing.assert_allclose(R @ symmetric_turn(R, ball), np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(R @ bop.symmetric_turn(R, ball), np.eye(3), atol=1e-12)
 
 
 INFO = {"1": {"diameter": 100.0}}

@@ -31,16 +31,13 @@ def test_a_camera_looks_at_its_target_with_the_world_upright():
     assert abs(above[0]) < 1e-9
 
 
-def test_pixels_that_see_nothing_have_no_mesh_and_no_depth():
+def test_the_nearer_mesh_is_seen_and_where_there_is_none_no_depth():
     small = (0.1 * WALL[0] / 9, WALL[1])
     view = MeshScene([small]).look(CAMERA, from_above(0.8))
     assert set(np.unique(view.mesh)) == {NOTHING, 0}
     assert np.isinf(view.depth_m[view.mesh == NOTHING]).all()
     assert np.array_equal(MeshScene([small]).silhouette(CAMERA, from_above(0.8)), view.mesh == 0)
     assert not DepthNoise().measure(view, np.random.default_rng(0))[0, 0]
-
-
-def test_the_nearer_mesh_hides_the_other():
     near = (0.05 * WALL[0] + [0, 0, 0.2], WALL[1])
     view = MeshScene([WALL, near]).look(CAMERA, from_above(0.8))
     assert view.mesh[30, 40] == 1

@@ -58,14 +58,11 @@ def test_points_on_a_mesh_are_those_that_trimesh_draws():
             assert np.array_equal(ours, expected)
 
 
-def test_draw_depends_on_names_alone():
+def test_a_draw_depends_on_names_and_used_vertices_alone():
     first = canonical_cloud(box(), "source", 100)[0]
     assert np.array_equal(first, canonical_cloud(box(), "source", 100)[0])
     assert not np.array_equal(first, canonical_cloud(box(), "other", 100)[0])
     assert not np.array_equal(first, canonical_cloud(box("box2"), "source", 100)[0])
-
-
-def test_unused_vertices_move_nothing():
     plain = box()
     stray = Surface("box", np.vstack([plain.vertices_m, [[9.0, 9.0, 9.0]]]), plain.faces)
     for expected, actual in zip(canonical_cloud(plain, "s", 64), canonical_cloud(stray, "s", 64), strict=True):
@@ -213,16 +210,13 @@ CUBOID = np.random.default_rng(0).uniform((0, 0, 0), (0.3, 0.4, 1.2), size=(500,
 CUBOID[:2] = (0, 0, 0), (0.3, 0.4, 1.2)
 
 
-def test_origin_and_unit_are_those_of_the_training():
+def test_origin_and_unit_are_those_of_the_training_and_poses_outside_move_points_alike():
     frame = CanonicalFrame.of(CUBOID + 5)
     np.testing.assert_allclose(frame.center_3, 5 + np.array([0.15, 0.2, 0.6]))
     assert frame.diameter == pytest.approx(1.3)
     inside = frame.coordinates(CUBOID + 5)
     np.testing.assert_allclose(inside.min(axis=0), -inside.max(axis=0))
     assert np.linalg.norm(inside[0] - inside[1]) == pytest.approx(1)
-
-
-def test_a_pose_outside_moves_points_as_it_does_inside():
     frame, T = CanonicalFrame(np.array([1.0, -2.0, 0.5]), 0.2), exp(np.array([[0.3, -0.2, 0.9, 0.1, 0.2, -0.4]]))[0]
     np.testing.assert_allclose(
         frame.coordinates(transform(frame.pose_outside(T), CUBOID)), transform(T, frame.coordinates(CUBOID))

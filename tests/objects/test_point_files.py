@@ -39,13 +39,10 @@ def binary_pcd(points, header_points=None):
     return f"{header}POINTS {n}\nDATA binary\n".encode() + table.tobytes()
 
 
-def test_ascii():
+def test_points_are_read_from_ascii_and_from_binary_among_other_fields():
     points = parse_pcd(ascii_pcd([ROWS[0], ROWS[1], ROWS[3]]), "x")
     assert points.dtype == np.float64
     assert points.tolist() == [[0.1, 0.2, 0.7], [-0.1, 0.25, 0.75], [0, 0.5, 0.5]]
-
-
-def test_binary_among_other_fields():
     points = np.random.default_rng(0).normal(size=(50, 3)).astype(np.float32)
     assert np.array_equal(parse_pcd(binary_pcd(points), "x"), points)
 

@@ -6,20 +6,7 @@ import trimesh
 from scipy.spatial.distance import pdist
 
 from gpca.errors import InputError
-from gpca.objects.procedural import (
-    CUPS,
-    FAMILIES,
-    box,
-    cylinder,
-    ellipsoid,
-    hull,
-    mesh_of,
-    revolved,
-    slab,
-    surfaces,
-    tube,
-    union,
-)
+from gpca.objects import procedural
 
 LINEMOD_MM = {  # extents x, y, z and diameter in models_info.json of BOP's lm
     "ape": (75.869, 77.599, 91.769, 102.099),
@@ -66,7 +53,7 @@ SCAN_DIAMETERS_MM = {name: diameter for name, (*_, diameter) in YCB_MM.items() i
 @pytest.fixture(scope="module")
 def built():
     """The surfaces of every family."""
-    return {family: list(surfaces(family)) for family in FAMILIES}
+    return {family: list(procedural.surfaces(family)) for family in procedural.FAMILIES}
 
 
 @pytest.fixture(scope="module")
@@ -85,10 +72,12 @@ def diameter_mm(mesh):
 
 def common(mesh, solid):
     """The part of a mesh in meters that lies inside of a solid in millimeters."""
-    return trimesh.boolean.intersection([mesh, trimesh.Trimesh(mesh_of(solid)[0] / 1000, mesh_of(solid)[1])])
+    return trimesh.boolean.intersection(
+        [mesh, trimesh.Trimesh(procedural.mesh_of(solid)[0] / 1000, procedural.mesh_of(solid)[1])]
+    )
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", procedural.FAMILIES)
 def test_every_object_is_one_closed_solid_of_a_table_top_s_size(built, family):
     objects = built[family]
     assert len({surface.name for surface in objects}) == len(objects) > 0
@@ -101,9 +90,9 @@ def test_every_object_is_one_closed_solid_of_a_table_top_s_size(built, family):
         assert surface.vertices_m.dtype == np.float64 and surface.faces.dtype == np.int64
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", procedural.FAMILIES)
 def test_building_twice_gives_identical_meshes(built, family):
-    for first, second in zip(built[family], surfaces(family), strict=True):
+    for first, second in zip(built[family], procedural.surfaces(family), strict=True):
         assert np.array_equal(first.vertices_m, second.vertices_m), first.name
         assert np.array_equal(first.faces, second.faces), first.name
 
@@ -131,7 +120,7 @@ def test_vessels_are_hollow_and_open_on_top(meshes, name):
     low, high = 1000 * mesh.bounds
     # The axis of the vessel is where its floor is: the mean of the points near the bottom.
     x, y = 1000 * mesh.triangles_center[mesh.triangles_center[:, 2] < low[2] / 1000 + 0.002][:, :2].mean(axis=0)
-    core = common(mesh, cylinder(20, high[2] - low[2], (x, y, (low[2] + high[2]) / 2)))
+    core = common(mesh, procedural.cylinder(20, high[2] - low[2], (x, y, (low[2] + high[2]) / 2)))
     assert core.extents[2] < 0.006  # a floor, and nothing but air above it
     assert mesh.volume < 0.25 * mesh.convex_hull.volume
 
@@ -141,32 +130,34 @@ def test_finger_loops_and_jaws_are_through_holes(meshes, name, loops):
     assert meshes[name].euler_number <= 2 - 2 * loops
 
 
-@pytest.mark.parametrize("name", CUPS)
+@pytest.mark.parametrize("name", procedural.CUPS)
 def test_cups_are_hollow_open_at_the_top_and_can_be_held(meshes, name):
-    mesh, cup = meshes[name], CUPS[name]
+    mesh, cup = meshes[name], procedural.CUPS[name]
     assert mesh.volume < 0.4 * mesh.convex_hull.volume
     floor, top = cup.floor, cup.profile[-1][1] + 5
-    inside = cylinder(10, top - floor - 0.3, (0, 0, (top + floor + 0.3) / 2))
+    inside = procedural.cylinder(10, top - floor - 0.3, (0, 0, (top + floor + 0.3) / 2))
     assert common(mesh, inside).is_empty
-    disc = cylinder(10, 0.5 * floor, (0, 0, 0.65 * floor))
+    disc = procedural.cylinder(10, 0.5 * floor, (0, 0, 0.65 * floor))
     assert common(mesh, disc).volume == pytest.approx(disc.volume() / 1e9)
     assert 1 - mesh.euler_number // 2 == cup.handles  # genus
 
 
 def test_unknown_family_is_refused_at_the_call():
     with pytest.raises(InputError, match=r"'teapots'.*coffee_cup, linemod, ycb"):
-        surfaces("teapots")
+        procedural.surfaces("teapots")
 
 
 def test_solids_have_the_volumes_of_the_textbook():
-    assert box((1, 2, 3)).volume() == pytest.approx(6)
-    assert cylinder(1, 2, axis="x").volume() == pytest.approx(2 * math.pi, rel=0.01)
-    assert cylinder(2, 3, top=1).volume() == pytest.approx(7 * math.pi, rel=0.01)
-    assert ellipsoid((1, 2, 3)).volume() == pytest.approx(8 * math.pi, rel=0.01)
-    assert revolved([(2, 0), (3, 0), (3, 1), (2, 1)]).volume() == pytest.approx(2 * math.pi * 2.5, rel=0.01)  # Pappus
-    capsule = tube([(0, 0, 0), (1, 2, 2)], 0.5).volume()
+    assert procedural.box((1, 2, 3)).volume() == pytest.approx(6)
+    assert procedural.cylinder(1, 2, axis="x").volume() == pytest.approx(2 * math.pi, rel=0.01)
+    assert procedural.cylinder(2, 3, top=1).volume() == pytest.approx(7 * math.pi, rel=0.01)
+    assert procedural.ellipsoid((1, 2, 3)).volume() == pytest.approx(8 * math.pi, rel=0.01)
+    assert procedural.revolved([(2, 0), (3, 0), (3, 1), (2, 1)]).volume() == pytest.approx(
+        2 * math.pi * 2.5, rel=0.01
+    )  # Pappus
+    capsule = procedural.tube([(0, 0, 0), (1, 2, 2)], 0.5).volume()
     assert capsule == pytest.approx(0.75 * math.pi + math.pi / 6, rel=0.03)
-    assert slab((4, 3, 2), 1).volume() == pytest.approx(2 * (12 - (4 - math.pi)), rel=0.01)
-    one, other = box((1, 1, 1)), box((1, 1, 1), (0.5, 0, 0))
-    assert union(one, other).volume() == pytest.approx(1.5)
-    assert hull(one, box((1, 1, 1), (2, 0, 0))).volume() == pytest.approx(3)
+    assert procedural.slab((4, 3, 2), 1).volume() == pytest.approx(2 * (12 - (4 - math.pi)), rel=0.01)
+    one, other = procedural.box((1, 1, 1)), procedural.box((1, 1, 1), (0.5, 0, 0))
+    assert procedural.union(one, other).volume() == pytest.approx(1.5)
+    assert procedural.hull(one, procedural.box((1, 1, 1), (2, 0, 0))).volume() == pytest.approx(3)

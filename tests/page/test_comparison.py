@@ -40,13 +40,10 @@ def test_numbers_have_the_papers_digits_and_verdicts_a_tone(tmp_path):
     assert shown["tables"][0]["title"] == "Table I: Single-concept attribution"
 
 
-def test_verdicts_are_counted_from_the_best_to_the_worst(tmp_path):
+def test_verdicts_are_counted_from_the_best_to_the_worst_repeats_and_deviations_apart(tmp_path):
     shown = page_comparison(written(tmp_path, HEAD + "".join(LINES) + LINES[0]))
     expected = [("reproduced", "good", 1), ("close", "near", 2), ("not reproduced", "bad", 1), ("not run", "", 1)]
     assert shown["verdicts"] == expected
-
-
-def test_repeats_and_standard_deviations_are_counted_apart(tmp_path):
     repeat = LINES[0].replace("mean,,", "mean,I / YCB / SA,")
     deviation = LINES[1].replace("mean,", "deviation,")
     shown = page_comparison(written(tmp_path, HEAD + repeat + deviation))

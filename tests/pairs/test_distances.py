@@ -4,24 +4,7 @@ import numpy as np
 import pytest
 
 from gpca.causes.settings import QUANTILES
-from gpca.pairs.distances import (
-    CHANNELS,
-    ENTROPY,
-    ENTROPY_FLOOR,
-    FEWEST_NEIGHBORS,
-    LEVELS,
-    RADII,
-    WIDTHS,
-    LocalPlanes,
-    MatchedPair,
-    ObservedPair,
-    _entropies,
-    describe_distances,
-    describe_entropy,
-    describe_points,
-    describe_registrations,
-    observed_once,
-)
+from gpca.pairs import distances
 from gpca.seeds import generator
 from tests.pairs.conftest import moved
 
@@ -30,21 +13,15 @@ MIDDLE = QUANTILES // 2
 
 def groups(pair):
     """The four distances, each by its quantiles."""
-    return describe_distances(pair)[0].reshape(4, QUANTILES)
+    return distances.describe_distances(pair)[0].reshape(4, QUANTILES)
 
 
-def test_there_are_52_distances_in_rising_quantiles(pair):
-    assert len(LEVELS) == QUANTILES
+def test_distances_rise_in_quantiles_are_none_to_itself_and_show_missing_surface_from_the_model(pair):
+    assert len(distances.LEVELS) == QUANTILES
     assert (np.diff(groups(pair), axis=1) >= 0).all()
-
-
-def test_a_cloud_on_itself_has_no_distances(pair):
     same = groups(replace(pair, model=pair.observed))
     assert same[:3] == pytest.approx(0, abs=1e-12)
     assert same[3, -1] > 0
-
-
-def test_missing_surface_is_seen_from_the_model_alone(pair):
     half = replace(pair, observed=pair.observed[pair.observed[:, 2] > np.median(pair.observed[:, 2])])
     whole, cropped = groups(pair), groups(half)
     assert cropped[1, -1] > 2 * whole[1, -1]
@@ -55,10 +32,10 @@ def test_a_shift_along_a_plane_leaves_the_distance_from_it():
     side = np.linspace(0, 1, 20)
     x, y = (axis.ravel() for axis in np.meshgrid(side, side))
     grid = np.column_stack([x, y, np.zeros(400)])
-    planes = LocalPlanes.of(grid)
+    planes = distances.LocalPlanes.of(grid)
     assert np.abs(planes.normals) == pytest.approx(np.tile([0, 0, 1], (400, 1)), abs=1e-6)
     assert planes.thickness == pytest.approx(0, abs=1e-7)
-    flat = ObservedPair(grid, grid, np.eye(4), np.eye(4)[None], np.ones(1), np.zeros(1), ())
+    flat = distances.ObservedPair(grid, grid, np.eye(4), np.eye(4)[None], np.ones(1), np.zeros(1), ())
     along, across = groups(moved(flat, [0.02, 0, 0])), groups(moved(flat, [0, 0, 0.02]))
     assert along[2, MIDDLE] == pytest.approx(0, abs=1e-9) and along[0, MIDDLE] == pytest.approx(0.02)
     assert across[2, MIDDLE] == pytest.approx(0.02)
@@ -66,17 +43,17 @@ def test_a_shift_along_a_plane_leaves_the_distance_from_it():
 
 @pytest.fixture(scope="module")
 def sparse_pair(registrations):
-    return observed_once(registrations, 0, 96, generator("points"))
+    return distances.observed_once(registrations, 0, 96, generator("points"))
 
 
 def told(pair, points=96):
-    return describe_points(pair, MatchedPair.of(pair), points)
+    return distances.describe_points(pair, distances.MatchedPair.of(pair), points)
 
 
 def test_a_point_is_told_where_it_is_and_how_far_the_other_cloud(sparse_pair):
     sides = told(sparse_pair)
-    assert sides.shape == (2, 96, CHANNELS) and sides.dtype == np.float32
-    spacing = np.median(MatchedPair.of(sparse_pair).model.spacing)
+    assert sides.shape == (2, 96, distances.CHANNELS) and sides.dtype == np.float32
+    spacing = np.median(distances.MatchedPair.of(sparse_pair).model.spacing)
     for cloud, other, side in (
         (sparse_pair.observed, sparse_pair.model, sides[0]),
         (sparse_pair.model, sparse_pair.observed, sides[1]),
@@ -99,29 +76,26 @@ def test_what_is_told_besides_the_place_does_not_depend_on_the_objects_size(spar
 
 
 def entropy(pair):
-    return dict(zip(ENTROPY, describe_entropy(pair), strict=True))
+    return dict(zip(distances.ENTROPY, distances.describe_entropy(pair), strict=True))
 
 
 def test_the_entropy_of_a_point_is_that_of_its_neighbors_covariance():
     points = np.random.default_rng(0).uniform(size=(200, 3))
-    found = _entropies(points, 0.2)
+    found = distances._entropies(points, 0.2)
     for i in range(0, 200, 17):
         near = points[np.linalg.norm(points - points[i], axis=1) <= 0.2]
-        if len(near) < FEWEST_NEIGHBORS:
+        if len(near) < distances.FEWEST_NEIGHBORS:
             assert np.isnan(found[i])
         else:
-            covariance = np.cov(near, rowvar=False, bias=True) + ENTROPY_FLOOR * np.eye(3)
+            covariance = np.cov(near, rowvar=False, bias=True) + distances.ENTROPY_FLOOR * np.eye(3)
             assert found[i] == pytest.approx(0.5 * np.log(np.linalg.det(2 * np.pi * np.e * covariance)))
 
 
-def test_clouds_that_do_not_lie_on_each_other_blur_when_joined(pair):
-    name = f"difference_{RADII[-1]:g}"
+def test_clouds_that_do_not_lie_on_each_other_blur_when_joined_and_points_without_neighbors_do_not(pair):
+    name = f"difference_{distances.RADII[-1]:g}"
     assert entropy(moved(pair, [0.04, 0, 0]))[name] > entropy(pair)[name]
-
-
-def test_points_without_neighbors_have_none(pair):
     far = replace(pair, observed=100 * pair.observed, model=100 * pair.model)
-    assert set(describe_entropy(far)) == {0.0}
+    assert set(distances.describe_entropy(far)) == {0.0}
 
 
 @pytest.fixture(scope="module")
@@ -130,12 +104,12 @@ def few(registrations):
 
 
 def described(registrations, **changes):
-    return describe_registrations(replace(registrations, **changes), "tiny", 100, points=128)
+    return distances.describe_registrations(replace(registrations, **changes), "tiny", 100, points=128)
 
 
 def test_every_group_has_its_width_and_is_finite(few):
     groups = described(few)
-    shapes = {name: (12, width) for name, width in WIDTHS.items()} | {"points": (12, 2, 128, 7)}
+    shapes = {name: (12, width) for name, width in distances.WIDTHS.items()} | {"points": (12, 2, 128, 7)}
     assert {name: array.shape for name, array in groups.items()} == shapes
     assert all(np.isfinite(array).all() for array in groups.values())
 

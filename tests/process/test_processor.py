@@ -12,14 +12,6 @@ import pytest
 
 from gpca.process import processor
 from gpca.process.code_files import ROOT
-from gpca.process.processor import (
-    COMMON_LEVEL,
-    INSTRUCTIONS_VARIABLE,
-    describe,
-    instructions,
-    pin_instructions,
-    prepare,
-)
 from tests.steps.command_lines import arguments, every_step
 
 # Each says of one library that it runs on another processor: without AVX, with AVX-512, or one of the other vendor.
@@ -146,7 +138,7 @@ def test_two_processors_give_the_same_bytes_and_would_not_without_the_pins(here,
     assert len(own) == len(there)
     # A step without loops: those would be compiled again.
     shutil.copytree(folder, tmp_path / "native")
-    variables = OTHER_PROCESSOR | {INSTRUCTIONS_VARIABLE: "native"}
+    variables = OTHER_PROCESSOR | {processor.INSTRUCTIONS_VARIABLE: "native"}
     native, _ = made_on(tmp_path / "native", [arguments("reduce")], **variables)
     assert {name for name in own if own[name] != native[name]} == {"reduced.npz"}
 
@@ -183,7 +175,7 @@ print(json.dumps({
     assert found["numpy"] == ["X86_V3"]
     assert set(found["blas"]) == {"Haswell"}
     assert found["torch"] == "AVX2"
-    assert found["numba"] == COMMON_LEVEL
+    assert found["numba"] == processor.COMMON_LEVEL
     assert set(found["threads"]) == {1}
 
 
@@ -214,32 +206,32 @@ model name\t: Another
 
 def test_a_processor_is_described_by_what_libraries_choose_by(cpuinfo):
     cpuinfo(HASWELL)
-    found = describe()
+    found = processor.describe()
     assert found["name"] == f"A Haswell, {os.cpu_count()} cores"
     assert (found["vendor"], found["family"], found["model"]) == ("GenuineIntel", "6", "60")
     assert found["flags"] == ["avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "sse4_2"]
     assert found["instructions"] == "native"
-    prepare(3)
-    assert describe()["instructions"] == instructions() == COMMON_LEVEL
+    processor.prepare(3)
+    assert processor.describe()["instructions"] == processor.instructions() == processor.COMMON_LEVEL
     assert {os.environ[name] for name in processor.THREAD_VARIABLES} == {"3"}
 
 
 @pytest.mark.parametrize("missing", sorted(processor._REQUIRED_FLAGS))
 def test_a_processor_without_the_level_keeps_its_own_instructions(cpuinfo, missing):
     cpuinfo(HASWELL.replace(f" {missing}", "", 1))
-    assert pin_instructions() == instructions() == "native"
+    assert processor.pin_instructions() == processor.instructions() == "native"
     assert "OPENBLAS_CORETYPE" not in os.environ  # Haswell's kernels would end it with an illegal instruction
 
 
 def test_whoever_wants_the_fastest_instructions_has_them(cpuinfo, monkeypatch):
     cpuinfo(HASWELL)
-    monkeypatch.setenv(INSTRUCTIONS_VARIABLE, "native")
-    assert pin_instructions() == "native"
+    monkeypatch.setenv(processor.INSTRUCTIONS_VARIABLE, "native")
+    assert processor.pin_instructions() == "native"
     assert "OPENBLAS_CORETYPE" not in os.environ
 
 
 def test_a_system_that_tells_nothing_of_its_processor(cpuinfo, monkeypatch, tmp_path):
     monkeypatch.setattr(processor, "CPUINFO", tmp_path / "nowhere")
-    assert pin_instructions() == "native"
-    assert describe()["vendor"] is None
-    assert "cores" in describe()["name"]
+    assert processor.pin_instructions() == "native"
+    assert processor.describe()["vendor"] is None
+    assert "cores" in processor.describe()["name"]

@@ -21,13 +21,10 @@ def fruits(tmp_path, monkeypatch):
         del sys.modules[name]
 
 
-def test_entries_are_found_in_all_modules_in_the_order_of_these(fruits):
+def test_entries_are_found_in_all_modules_in_their_order_and_in_a_new_file(fruits, tmp_path):
     assert list(fruits.entries().items()) == [("mango", 4), ("plum", 3), ("cherry", 1), ("apple", 2)]
     assert fruits.entry("apple") == 2
     assert (fruits.module("apple"), fruits.module("mango")) == ("fruits.red", "exotic")
-
-
-def test_a_file_that_is_new_in_the_folder_is_found(fruits, tmp_path):
     assert "lime" not in fruits.entries()
     (tmp_path / "fruits/green.py").write_text("FRUITS = {'lime': 5}")
     invalidate_caches()

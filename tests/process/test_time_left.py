@@ -48,16 +48,15 @@ def test_a_line_follows_a_count_of_jobs_but_not_each():
     assert lines == ["about 10 minutes left"]
 
 
-@pytest.fixture
-def begun(tmp_path, monkeypatch):
-    """Let a run of two jobs begin with what is known of their times; the lines that it says."""
+def test_a_run_begins_with_the_time_that_its_rules_took_and_says_nothing_where_none_was_measured(tmp_path, monkeypatch):
+    # Let a run of two jobs begin with what is known of their times; the lines that it says.
     logger = logging.getLogger("snakemake.logging")
     monkeypatch.setattr(time_left, "TIMES", tmp_path / "times.csv")
     (tmp_path / "times.csv").write_text("run,rule,seconds\ndefault,objects,600\n")
     benchmarks = [tmp_path / "objects.tsv", tmp_path / "page.tsv"]
     jobs = [SimpleNamespace(benchmark=path, rule=SimpleNamespace(name=path.stem)) for path in benchmarks]
 
-    def begin(run):
+    def begun(run):
         dag = SimpleNamespace(needrun_jobs=lambda: jobs, finished=lambda job: False)
         lines, handlers = [], list(logger.handlers)
         monkeypatch.setattr("snakemake.logging.logger.info", lambda line, extra: lines.append(line))
@@ -67,10 +66,6 @@ def begun(tmp_path, monkeypatch):
             logger.removeHandler(handler)
         return lines, len(added)
 
-    return begin
-
-
-def test_a_run_begins_with_the_time_that_its_rules_took_and_says_nothing_where_none_was_measured(begun):
     assert begun("default") == (["about 10 minutes left"], 1)
     assert begun("my_run") == ([], 1)
     time_left.TIMES.unlink()

@@ -18,14 +18,10 @@ ENCODER = EncoderSettings(draw_points=32, draws=1, epochs=1, batch_size=12, opti
 SETTINGS = {"gpca": {"iterations": 5, "inducing": 4, "draws": 20}}
 
 
-@pytest.fixture(scope="module")
-def learned(registrations):
+def test_an_answer_needs_no_label_and_takes_time_and_remedies_cost_registrations(registrations):
     names = ("gpca", "sa_supervised")
     uncertainty = UncertaintySettings(starts=13, icp_points=32)
-    return learn_explainers(names, registrations, ENCODER, SETTINGS, uncertainty, 9, "tiny", 0)
-
-
-def test_an_answer_needs_no_label_and_takes_time_and_remedies_cost_registrations(learned, registrations):
+    learned = learn_explainers(names, registrations, ENCODER, SETTINGS, uncertainty, 9, "tiny", 0)
     some = registrations.subset(registrations.rows("test")[:3]).without_labels()
     answers = {name: explain(some) for name, explain in learned.items()}
     assert list(answers) == ["gpca", "sa_supervised"]

@@ -112,14 +112,11 @@ def test_who_is_told_that_the_pose_is_wrong():
     assert alone == {"gpca", "utility", *gated}
 
 
-def test_a_repair_comes_before_anything_moves():
+def test_a_repair_comes_first_fixed_actions_stay_and_the_oracle_is_told_the_cause():
     assert made("repair_oracle")(case(cause="overlap")).action == "reinitialize"
     assert made("repair_oracle")(case(("reinitialize",), cause="overlap")).action == "new_view"
     scores = [[0.8, 0.1, 0.1], [0.7, 0.2, 0.1]]
     assert made("repair_gpca")(case(("reinitialize",), scores, bald=[0.9, 0.9])).action == "denoise"
-
-
-def test_fixed_actions_and_the_oracle():
     assert made("always_denoise")(case()).action == "denoise"
     treated = [made("oracle")(case(cause=cause)).action for cause in ("noise", "pose", "overlap")]
     assert treated == ["denoise", "reinitialize", "new_view"]

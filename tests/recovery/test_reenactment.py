@@ -116,16 +116,13 @@ def shot_of(cube, T_camera_object, hidden_to=0):
     return Shot(CAMERA, np.eye(4), depth_m, is_object)
 
 
-def test_the_true_pose_explains_all_and_others_the_less_the_farther_they_are(cube):
+def test_the_true_pose_explains_all_others_the_less_and_what_stands_in_front_says_nothing(cube):
     explained = appearance([shot_of(cube, at(0, 1))], cube)
     shares = [explained(at(x_m, 1), REACH_M) for x_m in (0, 0.1, 0.2, 2)]
     assert shares[0] == 1
     assert shares == sorted(shares, reverse=True) and shares[-1] == 0
     assert explained(at(0, 1.1), REACH_M) == 0  # behind what was measured: it would be elsewhere
     assert explained(at(0, 1.1), 0.2) > 0.8
-
-
-def test_what_stands_in_front_says_nothing(cube):
     explained = appearance([shot_of(cube, at(0, 1), hidden_to=40)], cube)
     assert explained(at(0, 1), REACH_M) == 1
     assert explained(at(0.2, 1), REACH_M) < 0.8  # there the camera looks through it at the wall

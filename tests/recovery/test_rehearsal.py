@@ -18,14 +18,10 @@ class Rehearsed:
         self.failed = number < 4
 
 
-@pytest.fixture
-def rehearsal():
-    """Four failures of little uncertainty, and four others of much."""
+def test_half_of_the_rehearsed_failures_are_above_the_threshold_unless_one_is_declared():
+    # Four failures of little uncertainty, and four others of much.
     episodes = [Rehearsed(number) for number in range(8)]
-    return Rehearsal(episodes, {}, {episode.number: 0.1 * (1 + episode.number) for episode in episodes})
-
-
-def test_half_of_the_rehearsed_failures_are_above_the_threshold_unless_one_is_declared(rehearsal):
+    rehearsal = Rehearsal(episodes, {}, {episode.number: 0.1 * (1 + episode.number) for episode in episodes})
     policy = robot_policy(SECTION, rehearsal)
     assert policy.thresholds.uncertain == pytest.approx(0.2)
     assert policy.thresholds.attempts == 3

@@ -43,14 +43,11 @@ def enacted(good_and_bad):
     return reenact_scans(causes, table["error_factor"].to_numpy(), SETTINGS, TRUTH)
 
 
-def test_what_is_wrong_is_named_without_the_truth(good_and_bad, enacted):
+def test_what_is_wrong_is_named_and_the_true_pose_found_without_the_truth(good_and_bad, enacted):
     causes, _ = good_and_bad
     named = [LABELS[row] for row in enacted.verdict.argmax(axis=1)]
     assert named == ["nominal", "pose"] == [causes.truth.state[0], causes.truth.dominant[1]]
     assert enacted.error[:, 0, ALL] == pytest.approx(causes.truth.error[:, ALL], abs=0.05)
-
-
-def test_the_best_hypothesis_is_the_true_pose(good_and_bad, enacted):
     registrations = good_and_bad[0].registrations
     T_true = scale_translation(registrations.T_target_source_true[1], 1 / registrations.diameter_m[1])
     T_off = enacted.T_model_observed[1, 0] @ np.linalg.inv(T_true)

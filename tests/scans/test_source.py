@@ -8,18 +8,9 @@ import trimesh
 
 from gpca.errors import InputError
 from gpca.rigid import scale_translation, transform
+from gpca.scans import source
 from gpca.scans.pair import near
 from gpca.scans.scene import ScanPairs
-from gpca.scans.source import (
-    ScanEntry,
-    benchmark_scenes,
-    data_files,
-    entry_of,
-    npz_scenes,
-    place_of,
-    ply_scenes,
-    scenes_of,
-)
 from gpca.scans.virtual import compound, room
 
 from .tiny import pair, scene
@@ -29,14 +20,14 @@ VIRTUAL = {"title": "Virtual", "kind": "virtual", "objects": 1, "views": 2}
 
 
 def test_an_optional_data_set_may_be_missing_and_another_not(tmp_path):
-    assert place_of(entry_of(FOLDER | {"optional": True}), str(tmp_path)) is None
+    assert source.place_of(source.entry_of(FOLDER | {"optional": True}), str(tmp_path)) is None
     with pytest.raises(InputError, match=r"scans: no such file or folder; get it from https://example.org"):
-        place_of(entry_of(FOLDER | {"address": "https://example.org"}), str(tmp_path))
+        source.place_of(source.entry_of(FOLDER | {"address": "https://example.org"}), str(tmp_path))
     path = write_npz(tmp_path / "scans/floor.npz")
-    assert place_of(entry_of(FOLDER), str(tmp_path)) == path.parent
-    assert data_files(entry_of(FOLDER), str(tmp_path)) == [path]
-    assert data_files(entry_of(VIRTUAL), None) == []
-    assert place_of(entry_of(VIRTUAL), None) is None  # wherever the repository is
+    assert source.place_of(source.entry_of(FOLDER), str(tmp_path)) == path.parent
+    assert source.data_files(source.entry_of(FOLDER), str(tmp_path)) == [path]
+    assert source.data_files(source.entry_of(VIRTUAL), None) == []
+    assert source.place_of(source.entry_of(VIRTUAL), None) is None  # wherever the repository is
 
 
 @pytest.mark.parametrize(
@@ -51,22 +42,22 @@ def test_an_optional_data_set_may_be_missing_and_another_not(tmp_path):
 )
 def test_faults_of_an_entry(settings, message):
     with pytest.raises(InputError, match=message):
-        entry_of(FOLDER | settings)
+        source.entry_of(FOLDER | settings)
 
 
 def test_scenes_of_development_are_apart_and_large_scans_are_thinned(tmp_path):
     for name in ("a", "b"):
         write_npz(tmp_path / f"{name}.npz")
-    entry = entry_of(FOLDER | {"development": ["a"], "families": {"b": "floors"}})
-    [development] = scenes_of(entry, tmp_path, "development", 10**6)
-    [evaluation] = scenes_of(entry, tmp_path, "evaluation", 50)
+    entry = source.entry_of(FOLDER | {"development": ["a"], "families": {"b": "floors"}})
+    [development] = source.scenes_of(entry, tmp_path, "development", 10**6)
+    [evaluation] = source.scenes_of(entry, tmp_path, "evaluation", 50)
     assert (development.name, evaluation.name, evaluation.family) == ("a", "b", "floors")
     assert {len(scan.points_N_3) for scan in evaluation.scans.values()} == {50}
     assert near(evaluation.scans["0"].points_N_3, development.scans["0"].points_N_3, 1e-6).all()
     with pytest.raises(InputError, match="has no scene for development"):
-        list(scenes_of(entry_of(FOLDER), tmp_path, "development", 50))
+        list(source.scenes_of(source.entry_of(FOLDER), tmp_path, "development", 50))
     with pytest.raises(InputError, match="Tiny: its data is not there; set data_dir"):
-        list(scenes_of(entry_of(FOLDER), None, "evaluation", 50))
+        list(source.scenes_of(source.entry_of(FOLDER), None, "evaluation", 50))
 
 
 def test_virtual_scans_of_one_scene_show_one_surface():
@@ -120,7 +111,7 @@ def test_a_pose_is_needed_of_every_scan():
 
 
 def entry(kind, **settings):
-    return ScanEntry(title="Tiny", kind=kind, location="there", **settings)
+    return source.ScanEntry(title="Tiny", kind=kind, location="there", **settings)
 
 
 def write_npz(path, poses="T_scene_cloud", order="index", change=lambda arrays: arrays):
@@ -175,12 +166,12 @@ def assert_same(read, tolerance=1e-6):
 @pytest.mark.parametrize("order", ["index", "name", ""])
 def test_npz(tmp_path, order):
     write_npz(tmp_path / "floor.npz", order=order)
-    [read] = npz_scenes(entry("npz"), tmp_path)
+    [read] = source.npz_scenes(entry("npz"), tmp_path)
     assert (read.name, read.kind) == ("floor", "room")
     assert_same(read)
-    [alone] = npz_scenes(entry("npz", scenes="object"), tmp_path / "floor.npz")
+    [alone] = source.npz_scenes(entry("npz", scenes="object"), tmp_path / "floor.npz")
     assert alone.kind == "object" and alone.scans["0"].viewpoint_3 is None
-    [model] = npz_scenes(entry("npz", sensor_at_origin=True), write_npz(tmp_path / "b/cup.npz", "T_model_cloud"))
+    [model] = source.npz_scenes(entry("npz", sensor_at_origin=True), write_npz(tmp_path / "b/cup.npz", "T_model_cloud"))
     assert model.kind == "object" and (model.scans["2"].viewpoint_3 == 0).all()
 
 
@@ -189,7 +180,7 @@ def test_pairs_beside_npz_files_are_those_that_count(tmp_path):
     write_npz(tmp_path / "other.npz")
     rows = "list,scene,target,source,overlap\n3DMatch,floor,0,2,0.31\n3DLoMatch,floor,0,2,0.31\n3DMatch,floor,0,1,0.6\n"
     (tmp_path / "pairs.csv").write_text(rows)
-    floor, other = npz_scenes(entry("npz"), tmp_path)
+    floor, other = source.npz_scenes(entry("npz"), tmp_path)
     assert [(pair.target, pair.source, pair.overlap) for pair in floor.known()] == [("0", "2", 0.31), ("0", "1", 0.6)]
     assert len(list(other.known())) == 3
 
@@ -208,7 +199,7 @@ def test_pairs_that_contradict_the_scans_or_each_other_are_refused(tmp_path, row
     write_npz(tmp_path / "floor.npz")
     (tmp_path / "pairs.csv").write_text(f"scene,target,source,overlap\nfloor,0,2,0.31\n{row}\n")
     with pytest.raises(InputError, match=message):
-        list(npz_scenes(entry("npz"), tmp_path))
+        list(source.npz_scenes(entry("npz"), tmp_path))
 
 
 def without(name):
@@ -233,12 +224,12 @@ NPZ_FAULTS = [
 
 
 def test_ply_folder(tmp_path):
-    [read] = ply_scenes(entry("ply_folder", scenes="room"), write_folder(tmp_path / "floor"))
+    [read] = source.ply_scenes(entry("ply_folder", scenes="room"), write_folder(tmp_path / "floor"))
     assert (read.name, read.kind) == ("floor", "room")
     assert_same(read)
     write_folder(tmp_path / "more/a", 1000.0)
     write_folder(tmp_path / "more/b", 1000.0)
-    several = list(ply_scenes(entry("ply_folder", scenes="object", unit="mm"), tmp_path / "more"))
+    several = list(source.ply_scenes(entry("ply_folder", scenes="object", unit="mm"), tmp_path / "more"))
     assert [each.name for each in several] == ["a", "b"]
     assert_same(several[1])
 
@@ -257,7 +248,7 @@ PLY_FAULTS = [
 
 @pytest.mark.parametrize("log", ["floor/gt.log", "floor-evaluation/gt.log"])
 def test_layout_of_3dmatch(tmp_path, log):
-    [read] = benchmark_scenes(entry("threedmatch"), write_benchmark(tmp_path, log))
+    [read] = source.benchmark_scenes(entry("threedmatch"), write_benchmark(tmp_path, log))
     assert (read.name, read.kind) == ("floor", "room")
     assert_same(read)
     shares = [pair.overlap for pair in read.known()]
@@ -275,10 +266,10 @@ BENCHMARK_FAULTS = [
 
 def test_a_benchmark_without_fragments_or_pairs_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"has no <scene>/cloud_bin_<number>.ply; correct location"):
-        list(benchmark_scenes(entry("threedmatch"), tmp_path))
+        list(source.benchmark_scenes(entry("threedmatch"), tmp_path))
     (write_benchmark(tmp_path) / "floor-evaluation/gt.log").unlink()
     with pytest.raises(InputError, match=r"floor/gt.log: no such file; put it there, or into floor-evaluation"):
-        list(benchmark_scenes(entry("threedmatch"), tmp_path))
+        list(source.benchmark_scenes(entry("threedmatch"), tmp_path))
 
 
 OVERLAP_FAULTS = [
@@ -287,9 +278,9 @@ OVERLAP_FAULTS = [
     (lambda text: "0,x,0.5\n", "gt_overlap.log, line 1: 'x' is not a whole number"),
 ]
 TEXTS = {
-    "poses.txt": (write_folder, ply_scenes, entry("ply_folder", scenes="room"), PLY_FAULTS),
-    "floor-evaluation/gt.log": (write_benchmark, benchmark_scenes, entry("threedmatch"), BENCHMARK_FAULTS),
-    "floor-evaluation/gt_overlap.log": (write_benchmark, benchmark_scenes, entry("threedmatch"), OVERLAP_FAULTS),
+    "poses.txt": (write_folder, source.ply_scenes, entry("ply_folder", scenes="room"), PLY_FAULTS),
+    "floor-evaluation/gt.log": (write_benchmark, source.benchmark_scenes, entry("threedmatch"), BENCHMARK_FAULTS),
+    "floor-evaluation/gt_overlap.log": (write_benchmark, source.benchmark_scenes, entry("threedmatch"), OVERLAP_FAULTS),
 }
 
 
@@ -306,17 +297,21 @@ def test_faults_of_text_beside_clouds(tmp_path, name, change, message):
 def test_faults_of_npz(tmp_path, change, message):
     write_npz(tmp_path / "floor.npz", change=change)
     with pytest.raises(InputError, match=message):
-        list(npz_scenes(entry("npz"), tmp_path))
+        list(source.npz_scenes(entry("npz"), tmp_path))
 
 
 def test_folders_without_what_makes_a_scene(tmp_path):
     for scenes, settings, message in (
-        (npz_scenes, entry("npz"), "the folder has no npz file; correct location"),
-        (ply_scenes, entry("ply_folder"), "Tiny: does not say what its scenes are; set scenes"),
-        (ply_scenes, entry("ply_folder", scenes="room"), r"poses.txt: no such file; give the poses of the scans"),
+        (source.npz_scenes, entry("npz"), "the folder has no npz file; correct location"),
+        (source.ply_scenes, entry("ply_folder"), "Tiny: does not say what its scenes are; set scenes"),
+        (
+            source.ply_scenes,
+            entry("ply_folder", scenes="room"),
+            r"poses.txt: no such file; give the poses of the scans",
+        ),
     ):
         with pytest.raises(InputError, match=message):
             list(scenes(settings, tmp_path))
     (tmp_path / "floor.npz").write_text("not a zip")
     with pytest.raises(InputError, match=r"floor.npz: is not a readable npz archive; fetch it again"):
-        list(npz_scenes(entry("npz"), tmp_path))
+        list(source.npz_scenes(entry("npz"), tmp_path))

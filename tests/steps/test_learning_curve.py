@@ -35,11 +35,6 @@ def samples(causes, further):
     return pool, described.subset(causes.rows("test"))
 
 
-@pytest.fixture(scope="module")
-def curve(samples, causes):
-    return learning_curve(*samples, causes.subset(causes.rows("test")), SETTINGS, "four", 100)
-
-
 def test_further_samples_are_labeled_of_all_objects_and_new(causes, further):
     names = causes.registrations.object_name
     assert set(further.registrations.object_name) <= set(names) > set(names[causes.rows("train")])
@@ -59,7 +54,8 @@ def test_cheap_descriptors_are_those_of_the_explainers(causes):
         assert np.array_equal(getattr(own, name), described.groups[name])
 
 
-def test_every_learner_has_a_row_of_each_size_and_order_beside_the_truth(curve):
+def test_every_learner_has_a_row_of_each_size_and_order_beside_the_truth(samples, causes):
+    curve = learning_curve(*samples, causes.subset(causes.rows("test")), SETTINGS, "four", 100)
     assert tuple(curve.columns) == CURVE_COLUMNS
     counts = curve.groupby("learner").size()
     assert counts[CEILING] == 1 and all(counts[name] == 4 for name in LEARNERS)

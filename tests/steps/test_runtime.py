@@ -1,5 +1,4 @@
 import numpy as np
-import pytest
 
 from gpca.active_learning.rounds import make_task
 from gpca.active_learning.settings import ActiveLearningSettings
@@ -8,17 +7,13 @@ from gpca.evaluation.runtime_file import COMPONENTS
 from gpca.steps.runtime import measure
 
 
-@pytest.fixture(scope="module")
-def runtime(model, registrations):
+def test_every_component_is_measured_so_often_and_an_explanation_takes_longer_than_its_embedding(model, registrations):
     from dataclasses import replace
 
     h_S_d = np.random.default_rng(0).normal(size=(len(registrations), 32)).astype(np.float32)
     settings = ActiveLearningSettings(initial=8, batch=2, gpc=GPCSettings(iterations=3, inducing=6, draws=20))
     task = make_task(replace(registrations, attached={"embedding": h_S_d}), "overlap", settings, "tiny", 0)
-    return measure(model, registrations, task, settings, 3, 1, "tiny", 0)
-
-
-def test_every_component_is_measured_so_often_and_an_explanation_takes_longer_than_its_embedding(runtime):
+    runtime = measure(model, registrations, task, settings, 3, 1, "tiny", 0)
     on_cpu = runtime[runtime["device"] == "CPU"]
     assert on_cpu["component"].tolist() == list(COMPONENTS)
     assert (runtime["repeats"] == 3).all()

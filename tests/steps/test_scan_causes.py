@@ -29,18 +29,14 @@ def named(pair, number):
     return replace(pair, source_name=f"scan{number}", target_name=f"scan{number + 1}")
 
 
-@pytest.fixture(scope="module")
-def pairs():
-    """Two scenes with a pair of little overlap and two of much."""
+def test_starts_are_rungs_without_the_perfect_one_global_poses_and_noise_in_turns():
+    # Two scenes with a pair of little overlap and two of much.
     made = [
         named(corner_pair(shared, points=600, scene=scene), 10 * number)
         for scene in ("hall", "kitchen")
         for number, shared in enumerate((0.2, 0.8, 0.9))
     ]
-    return ScanPairs.of(made)
-
-
-def test_starts_are_rungs_without_the_perfect_one_global_poses_and_noise_in_turns(pairs):
+    pairs = ScanPairs.of(made)
     settings = ScanSamples(ladder_starts=2, times=(1.0, 3.0))
     found = {"good": lambda pair: pair.T_target_source, "failing": lambda pair: None}
     starts = starts_of(pairs, *AXES, settings, LADDER_OF_THREE, found)

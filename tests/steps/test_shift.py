@@ -11,14 +11,7 @@ from gpca.errors import InputError
 from gpca.explainers.gpca import GPCA
 from gpca.explainers.registry import explainer_entry
 from gpca.pairs.shifted_sets import TRAINED_ON
-from gpca.steps.shift import (
-    PRINCIPAL_COMPONENTS,
-    ShiftSettings,
-    distances,
-    make_sets,
-    predict_sets,
-    principal_components,
-)
+from gpca.steps import shift
 
 from ..pairs.test_shifted_sets import sets
 
@@ -32,7 +25,7 @@ SHIFT = {
     "neighbours": 3,
     "shape_points": 16,
 }
-SETTINGS = ShiftSettings.from_dicts(SHIFT, {"cloud_points": 256, "train": 36, "test": 18}, ENCODER)
+SETTINGS = shift.ShiftSettings.from_dicts(SHIFT, {"cloud_points": 256, "train": 36, "test": 18}, ENCODER)
 RANDOM = np.random.default_rng(0)
 
 
@@ -46,7 +39,7 @@ def embedded(registrations):
 @pytest.fixture(scope="module")
 def shifted(objects, embedded):
     embed_own, registrations = embedded
-    return make_sets(objects, registrations, registrations, embed_own, "tiny", 0, SETTINGS)
+    return shift.make_sets(objects, registrations, registrations, embed_own, "tiny", 0, SETTINGS)
 
 
 def test_all_sets_are_there_and_of_the_declared_size(shifted, embedded):
@@ -82,7 +75,7 @@ def test_no_view_of_an_object_that_is_held_out_is_trained_on(objects, embedded):
     views = {name: f"mug_{i // 2}_1_{i}" for i, name in enumerate(np.unique(registrations.object_name).tolist())}
     names = np.array([views[name] for name in registrations.object_name.tolist()])
     viewed = replace(registrations, object_name=names, cluster=np.array([name[:5] for name in names.tolist()]))
-    sets = make_sets(objects, viewed, None, embed_own, "tiny", 0, SETTINGS)
+    sets = shift.make_sets(objects, viewed, None, embed_own, "tiny", 0, SETTINGS)
     seen, unseen = ({name[:5] for name in sets.object_name[sets.set == part]} for part in ("seen_objects", "objects"))
     assert unseen
     assert not seen & unseen
@@ -91,7 +84,7 @@ def test_no_view_of_an_object_that_is_held_out_is_trained_on(objects, embedded):
 def test_knn_is_the_mean_over_the_nearest_in_standardized_features():
     train, query = np.array([[0.0], [1.0], [2.0], [3.0]]), np.array([[1.0], [13.0]])
     deviation = np.std(train)
-    assert distances(train, query, 2)[:, 0] == pytest.approx([0.5 / deviation, 10.5 / deviation])
+    assert shift.distances(train, query, 2)[:, 0] == pytest.approx([0.5 / deviation, 10.5 / deviation])
 
 
 def test_mahalanobis_of_many_samples_is_that_of_their_covariance():
@@ -99,16 +92,16 @@ def test_mahalanobis_of_many_samples_is_that_of_their_covariance():
     train, query = RANDOM.normal(size=(20000, 2)) @ mixing.T, RANDOM.normal(size=(5, 2)) * 3
     precision = np.linalg.inv(mixing @ mixing.T)
     expected = np.sqrt(np.einsum("sf,fg,sg->s", query, precision, query))
-    assert distances(train, query, 10)[:, 1] == pytest.approx(expected, rel=0.05)
+    assert shift.distances(train, query, 10)[:, 1] == pytest.approx(expected, rel=0.05)
 
 
 def test_principal_components_keep_what_varies_and_learn_from_the_training_samples_alone():
     wide = RANDOM.normal(size=(40, 3)) @ RANDOM.normal(size=(3, 50))
-    train, query = principal_components(wide, wide[:7])
-    assert train.shape == (40, PRINCIPAL_COMPONENTS)
+    train, query = shift.principal_components(wide, wide[:7])
+    assert train.shape == (40, shift.PRINCIPAL_COMPONENTS)
     assert query == pytest.approx(train[:7])
     assert np.abs(train[:, 3:]).max() < 1e-8
-    assert principal_components(wide, 1e6 * wide[:7])[0] == pytest.approx(train)
+    assert shift.principal_components(wide, 1e6 * wide[:7])[0] == pytest.approx(train)
 
 
 def quick():
@@ -116,7 +109,7 @@ def quick():
 
 
 def test_every_test_sample_of_every_set_is_explained_once():
-    frame = predict_sets(quick, sets())
+    frame = shift.predict_sets(quick, sets())
     assert frame.columns[0] == "set"
     assert frame["set"].value_counts().to_dict() == dict.fromkeys(
         ("in_distribution", "severity", "seen_objects", "objects"), 12
@@ -129,7 +122,7 @@ def test_each_encoder_has_a_learner_of_its_own():
     given = sets()
     second = np.isin(given.set, ["seen_objects", "objects"])
     given.h[second] **= 3
-    frame, plain = predict_sets(quick, given), predict_sets(quick, sets())
+    frame, plain = shift.predict_sets(quick, given), shift.predict_sets(quick, sets())
     first = ~frame["set"].isin(["seen_objects", "objects"])
     assert frame[first].equals(plain[first])
     assert not frame[~first].equals(plain[~first])
@@ -141,7 +134,7 @@ def test_the_truth_is_hidden_and_the_prediction_that_of_the_explainer():
     learner.fit(given.registrations(given.rows("in_distribution", "train")))
     rows = given.rows("severity", "test")
     expected = learner.explain(given.registrations(rows)).scores_N_C
-    frame = predict_sets(lambda: explainer_entry("learner_logistic").make("tiny", 0), given)
+    frame = shift.predict_sets(lambda: explainer_entry("learner_logistic").make("tiny", 0), given)
     frame = frame[frame["set"] == "severity"]
     assert frame.filter(like="score_").to_numpy() == pytest.approx(expected)
     assert frame["concept_true"].tolist() == given.concept[rows].tolist()
@@ -151,8 +144,8 @@ def test_a_concept_absent_from_training_keeps_its_column_and_one_concept_is_a_fa
     given = sets()
     few = given.split == "train"
     given.concept[few & (given.concept == "pose")] = "noise"
-    frame = predict_sets(lambda: explainer_entry("learner_forest").make("tiny", 0), given)
+    frame = shift.predict_sets(lambda: explainer_entry("learner_forest").make("tiny", 0), given)
     assert (frame["score_pose"] == 0).all()
     given.concept[few] = "noise"
     with pytest.raises(InputError, match="fewer than two concepts"):
-        predict_sets(lambda: explainer_entry("learner_forest").make("tiny", 0), given)
+        shift.predict_sets(lambda: explainer_entry("learner_forest").make("tiny", 0), given)

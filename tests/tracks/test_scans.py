@@ -91,15 +91,6 @@ def published(shipped, tmp_path, monkeypatch):
     return Published.load(TRACK)
 
 
-@pytest.fixture
-def without(folder, tmp_path):
-    """The samples of somebody who lacks the rarer data set."""
-    shutil.copytree(folder, own := tmp_path / "samples")
-    for kind in ("causes", "descriptors", "reenactments"):
-        shutil.rmtree(own / f"scan_{kind}/{RARE}")
-    return own
-
-
 def test_what_is_shipped_is_of_the_data_sets_of_the_run_and_says_where_methods_learned(shipped, causes):
     n = len(causes.rows("test"))
     assert [(source, len(rows)) for source, _, rows in shipped.rows.parts()] == [(EVERYWHERE, n), (RARE, n)]
@@ -140,7 +131,11 @@ def test_a_method_in_a_file_stands_among_the_published_rows_of_every_data_set(me
     assert numbers[0] == numbers[1]
 
 
-def test_who_lacks_a_data_set_is_scored_on_the_others_and_told_so(method, published, without, tmp_path, capsys):
+def test_who_lacks_a_data_set_is_scored_on_the_others_and_told_so(method, published, folder, tmp_path, capsys):
+    # The samples of somebody who lacks the rarer data set.
+    shutil.copytree(folder, without := tmp_path / "samples")
+    for kind in ("causes", "descriptors", "reenactments"):
+        shutil.rmtree(without / f"scan_{kind}/{RARE}")
     assert main(["bench", "scans", method, "--samples", str(without), "--out", "said.csv"]) == 0
     shown = capsys.readouterr().out
     assert len(re.findall(f"{MARK}RMSE below its median", shown)) == 1

@@ -61,18 +61,14 @@ def test_the_table_ranks_by_the_headline_marks_the_new_row_and_ends_with_the_cei
     assert "Minus Mine (points)" in text and shipped.version in text
 
 
-@pytest.fixture
-def hard(shipped):
-    """The same samples as those of the track `hard`, of which the published method names two thirds rightly."""
+def test_hard_samples_are_scored_by_accuracy_and_by_concept(shipped):
+    # The same samples as those of the track `hard`, of which the published method names two thirds rightly.
     rows = replace(shipped.rows, concept=np.resize(CONCEPTS, len(shipped.rows)))
     right_N = np.arange(len(rows)) % len(CONCEPTS)
     named_N = np.where(right_N == 2, 0, right_N)
     scores_N_3 = np.where(named_N[:, None] == np.arange(3), 0.8, 0.1)
     published = Method("rule", "Rule", "pair", 0, scores_N_3, named_N)
-    return replace(shipped, track=TRACKS["hard"], rows=rows, methods=(published,))
-
-
-def test_hard_samples_are_scored_by_accuracy_and_by_concept(hard):
+    hard = replace(shipped, track=TRACKS["hard"], rows=rows, methods=(published,))
     scores, _ = score(hard, {})
     concept_N = hard.rows.concept
     assert of(scores, metric="accuracy")["value"] == pytest.approx((concept_N != "overlap").mean())

@@ -21,20 +21,15 @@ def files_of(source, planned):
     return {"/".join(OLD_ROW if part == source else part for part in path) for path in parts if source in path}
 
 
-@pytest.fixture
-def meshes(tmp_path):
-    """A folder with three meshes in three formats, in millimetres, as docs/adding.md has it."""
+def test_a_folder_of_meshes_and_a_rule_of_an_own_source_are_planned_like_others(finished, planned, tmp_path):
+    # A folder with three meshes in three formats, in millimetres, as docs/adding.md has it.
     import trimesh
 
-    folder = tmp_path / "data" / "my_parts"
-    folder.mkdir(parents=True)
-    trimesh.creation.box((40, 70, 100)).export(folder / "brick.stl")
-    trimesh.creation.cone(30, 90).export(folder / "cone.ply")
-    trimesh.creation.annulus(20, 35, 25).export(folder / "ring.obj")
-    return folder
-
-
-def test_a_folder_of_meshes_and_a_rule_of_an_own_source_are_planned_like_others(finished, planned, meshes):
+    meshes = tmp_path / "data" / "my_parts"
+    meshes.mkdir(parents=True)
+    trimesh.creation.box((40, 70, 100)).export(meshes / "brick.stl")
+    trimesh.creation.cone(30, 90).export(meshes / "cone.ply")
+    trimesh.creation.annulus(20, 35, 25).export(meshes / "ring.obj")
     finished.append("config/sources.yaml", block("config/sources.yaml", "my_parts").removeprefix("sources:\n"))
     data_dir = ("--config", f"data_dir={meshes.parent}")
     again = finished.dry_run("all", *SMOKE, *data_dir)

@@ -3,22 +3,10 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
-import pytest
 from matplotlib.colors import to_rgb
 
 from gpca.process.code_files import code_files
 from gpca.reporting.figures import style
-
-
-@pytest.fixture
-def figure():
-    style.use_style()
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots()
-    axes.plot([0, 1], [1, 0])
-    axes.set_title("Fits $\\sigma$")
-    return figure
 
 
 def test_the_palette_is_that_of_the_file_and_a_users_own_settings_change_nothing():
@@ -40,7 +28,13 @@ def test_the_palette_is_that_of_the_file_and_a_users_own_settings_change_nothing
     style.use_style()
 
 
-def test_letters_are_truetype_and_nothing_is_dated(figure, tmp_path):
+def test_letters_are_truetype_and_nothing_is_dated(tmp_path):
+    style.use_style()
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots()
+    axes.plot([0, 1], [1, 0])
+    axes.set_title("Fits $\\sigma$")
     style.save_figure(figure, tmp_path / "a.pdf", tmp_path / "a.png")
     pdf, png = (tmp_path / "a.pdf").read_bytes(), (tmp_path / "a.png").read_bytes()
     assert b"/TrueType" in pdf or b"/CIDFontType2" in pdf

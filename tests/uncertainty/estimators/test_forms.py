@@ -9,24 +9,18 @@ from gpca.uncertainty.estimators.interface import FailedEstimate, RegisteredPair
 from .cases import DEVIATION_6, plane, registered
 
 
-def test_bonnabel_is_the_variance_over_the_hessian_of_planes():
+def test_bonnabel_is_the_variance_over_the_hessian_of_planes_where_there_is_one():
     pair = registered("point_to_plane", noise=0.01)
     matches = pair.matches()
     rows = np.array([[*np.cross(y, n), *n] for y, n in zip(matches.source, matches.normals, strict=True)])
     distances = np.array([n @ (y - q) for y, q, n in zip(matches.source, matches.target, matches.normals, strict=True)])
     expected = distances @ distances / (len(rows) - 6) * np.linalg.inv(rows.T @ rows)
     assert analytic.bonnabel(pair) == pytest.approx(expected)
-
-
-def test_bonnabel_refuses_point_to_point_and_says_why():
     for method in ("point_to_point", "point_to_point_open3d"):
         with pytest.raises(FailedEstimate, match=r"no covariance of point-to-point, as .*; register by point_to_plane"):
             analytic.bonnabel(registered(method))
     with pytest.raises(FailedEstimate, match="not of 'gicp'"):
         analytic.bonnabel(registered("gicp"))
-
-
-def test_the_three_open_directions_of_a_plane_are_counted():
     with pytest.raises(FailedEstimate, match="singular: 3 of 6 directions are open"):
         analytic.bonnabel(registered("point_to_plane", plane))
 
