@@ -40,7 +40,7 @@ class Attribution:
         concepts: tuple[str, ...],
         scores_N_C: np.ndarray,
         *,
-        seconds: np.ndarray | float,
+        seconds: np.ndarray | float = 0.0,
         icp_seconds: np.ndarray | float = 0.0,
         icp_calls: np.ndarray | int = 0,
         abstained_N: np.ndarray | None = None,

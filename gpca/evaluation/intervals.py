@@ -29,14 +29,7 @@ NO_WIDTH = 1e-9  # an interval this narrow differs from a point by rounding alon
 ANYTHING = (-np.inf, np.inf)  # limits of a value that has none
 GUESSES = ("chance", "most_frequent")
 WITHOUT_TRAINING = (*GUESSES, "rule")
-TRIVIAL = (
-    *WITHOUT_TRAINING,
-    "rule_fitted",
-    "tree_trivial",
-    "logistic_trivial",
-    "density",
-    "hypotheses",
-)
+TRIVIAL = (*WITHOUT_TRAINING, "rule_fitted", "tree_trivial", "logistic_trivial", "density", "hypotheses")
 
 
 def mean_ranks(values_N: np.ndarray) -> np.ndarray:

@@ -10,17 +10,14 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gpca.errors import InputError
 from gpca.evaluation.intervals import ANYTHING, Clustered, best_of, corrected, interval, weighted_mean
 from gpca.io.csv_file import read_numbers, write_csv
+from gpca.io.frame import Frame
 from gpca.seeds import seed_of_file
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 ALL = "all"  # the part of the samples, or the concept, that comprises all of them
 POOLED = "pooled"  # the source that comprises all of them
@@ -41,15 +38,15 @@ Rivals = Callable[[str, Collection[str]], Collection[str]]  # of a method, among
 class Measure:
     """A statistic of samples, by default the mean of a column or of a function of the samples."""
 
-    of: str | Callable[[pd.DataFrame], np.ndarray] = ""  # column, or function that returns a value per sample (N,)
+    of: str | Callable[[Frame], np.ndarray] = ""  # column, or function that returns a value per sample (N,)
     limits: tuple[float, float] | None = SHARE  # least and greatest value; a share of samples has its own interval
     only: tuple[str, ...] = ()  # parts of the samples that it is taken over; all if empty
-    statistic: Callable[[pd.DataFrame, np.ndarray], np.ndarray] | None = None  # of samples and weights (1 + B, N)
-    counted: Callable[[pd.DataFrame], np.ndarray] | None = None  # mask of the samples that it depends on (N,)
+    statistic: Callable[[Frame, np.ndarray], np.ndarray] | None = None  # of samples and weights (1 + B, N)
+    counted: Callable[[Frame], np.ndarray] | None = None  # mask of the samples that it depends on (N,)
     least_is_best: bool = False  # of two values, the smaller one is better
     factor: float = 1.0  # from the mean to the measure's unit
 
-    def values(self, samples: pd.DataFrame, weights_B_N: np.ndarray) -> np.ndarray:
+    def values(self, samples: Frame, weights_B_N: np.ndarray) -> np.ndarray:
         """Values (B,) by weights of the samples."""
         if self.statistic is not None:
             return self.statistic(samples, weights_B_N)
@@ -57,7 +54,7 @@ class Measure:
         return weighted_mean(value_N, weights_B_N) * self.factor
 
 
-def by_value(samples: pd.DataFrame, column: str, values: Iterable[str]) -> dict[str, np.ndarray]:
+def by_value(samples: Frame, column: str, values: Iterable[str]) -> dict[str, np.ndarray]:
     """Masks of all samples, and of those with each value in a column."""
     masks = {value: (samples[column] == value).to_numpy() for value in values}
     return {ALL: np.ones(len(samples), bool)} | masks
@@ -67,8 +64,8 @@ COUNT = Measure(statistic=lambda _samples, weights_B_N: weights_B_N.sum(axis=1),
 
 
 def read_samples(
-    files: Iterable[str | Path], read: Callable[[Path], pd.DataFrame], names: tuple[str, ...] = ("source", "method")
-) -> pd.DataFrame:
+    files: Iterable[str | Path], read: Callable[[Path], Frame], names: tuple[str, ...] = ("source", "method")
+) -> Frame:
     """Rows of files named ``…/{source}/{method}/seed{seed}.csv``, with these three as columns."""
     import pandas as pd
 
@@ -81,9 +78,7 @@ def read_samples(
     return pd.concat(frames, ignore_index=True)
 
 
-def per_seed(
-    samples: pd.DataFrame, parts: Callable[[pd.DataFrame], Parts], measures: Mapping[str, Measure]
-) -> pd.DataFrame:
+def per_seed(samples: Frame, parts: Callable[[Frame], Parts], measures: Mapping[str, Measure]) -> Frame:
     """`TIDY_COLUMNS` of each measure by table, source, method, seed and part, and the number of ``test_samples``."""
     records = []
     for (*keys, seed), rows in samples.groupby([*GROUPS, "seed"], sort=False):
@@ -98,8 +93,8 @@ def per_seed(
 
 
 def over_seeds(
-    samples: pd.DataFrame, parts: Callable[[pd.DataFrame], Parts], measures: Mapping[str, Measure], draws: Clustered
-) -> pd.DataFrame:
+    samples: Frame, parts: Callable[[Frame], Parts], measures: Mapping[str, Measure], draws: Clustered
+) -> Frame:
     """`COLUMNS` of each measure by table, source, method and part, over all seeds; an index selects draws."""
     import pandas as pd
 
@@ -149,7 +144,7 @@ def compared(
     return rows
 
 
-def intervals(records: list[tuple], name: str, most: float = np.inf) -> pd.DataFrame:
+def intervals(records: list[tuple], name: str, most: float = np.inf) -> Frame:
     """Frame of `COLUMNS`, or of `KEYS`, `AGAINST` and `NUMBERS`; `name` says what the records are of.
 
     Differences have :func:`corrected <gpca.evaluation.intervals.corrected>` bounds: those from the best of several
@@ -169,31 +164,31 @@ def intervals(records: list[tuple], name: str, most: float = np.inf) -> pd.DataF
     return rows
 
 
-def read_clustered(path: str | Path) -> pd.DataFrame:
+def read_clustered(path: str | Path) -> Frame:
     """Read a file of intervals; a value without one has NaN bounds, a row that is no difference no ``against``."""
     rows = read_numbers(path, COLUMNS, NUMBERS, optional=("low", "high"), others=AGAINST)
     return rows.assign(**{name: "" for name in AGAINST if name not in rows})
 
 
-def read_rows(path: str | Path) -> pd.DataFrame:
+def read_rows(path: str | Path) -> Frame:
     """Read a file of numbers of either form: :func:`read_clustered` or :func:`read_metrics`."""
     with Path(path).open(encoding="utf-8", errors="replace") as file:
         head = file.readline().strip().split(",")
     return read_clustered(path) if "low" in head else read_metrics(path)
 
 
-def read_metrics(path: str | Path) -> pd.DataFrame:
+def read_metrics(path: str | Path) -> Frame:
     return read_numbers(path, TIDY_COLUMNS, ("seed", "value")).astype({"seed": int})
 
 
-def read_all_metrics(paths: Iterable[str | Path]) -> pd.DataFrame:
+def read_all_metrics(paths: Iterable[str | Path]) -> Frame:
     """Read several files as :func:`read_metrics` reads one, one after the other."""
     import pandas as pd
 
     return pd.concat([read_metrics(path) for path in paths])
 
 
-def write_metrics(metrics: pd.DataFrame, path: str | Path) -> None:
+def write_metrics(metrics: Frame, path: str | Path) -> None:
     """Write numbers as CSV; floats keep every digit, so equal numbers give equal bytes."""
     write_csv(path, metrics, form=None)
 
@@ -203,7 +198,7 @@ def tidy(
     name: str,
     columns: Sequence[str] = TIDY_COLUMNS,
     remedy: str = "name at least one explainer in the config",
-) -> pd.DataFrame:
+) -> Frame:
     """Frame of `TIDY_COLUMNS`; `name` says what the records are of."""
     import pandas as pd
 

@@ -29,6 +29,11 @@ class Job:
         value = self.__dict__.get(name)
         return default if value in (None, "", []) else value
 
+    @property
+    def axes(self) -> tuple[str, int]:
+        """Source and seed."""
+        return self.source, self.seed
+
     def section(self, name: str) -> dict[str, Any]:
         """Return a part of ``settings``, empty where it is absent or null."""
         return self.settings.get(name) or {}

@@ -8,7 +8,7 @@ from gpca.active_learning.curves import TABLE
 from gpca.active_learning.settings import JUDGED_SHARE, rare_setting
 from gpca.causes.judged import CEILING
 from gpca.evaluation.intervals import TRIVIAL
-from gpca.evaluation.measures import ALL, POOLED, read_clustered, read_metrics
+from gpca.evaluation.measures import ALL, POOLED, read_rows
 from gpca.experiments.leads import JUDGED, TRAINED, lead
 from gpca.experiments.shifts import MEAN, reached
 from gpca.explainers.gpca import GPCA_FORMS
@@ -41,18 +41,18 @@ class Titles(NamedTuple):
 
 def findings_of(folder: Path, titles: Titles, shown: Collection[str]) -> list[Finding]:
     """Return the findings from the collected files in ``results/{run}`` whose results are shown."""
-    readers: dict[str, tuple[Callable, Callable[[Frame, Titles], Iterator[Finding]]]] = {
-        "attribution_intervals.csv": (read_clustered, _concepts),
-        "cause_intervals.csv": (read_clustered, _causes),
-        "shifts.csv": (read_clustered, _shifts),
-        "real_world_intervals.csv": (read_clustered, _frames),
-        "active_learning.csv": (read_metrics, _labels),
-        "recovery_intervals.csv": (read_clustered, _recovery),
+    readers: dict[str, Callable[[Frame, Titles], Iterator[Finding]]] = {
+        "attribution_intervals.csv": _concepts,
+        "cause_intervals.csv": _causes,
+        "shifts.csv": _shifts,
+        "real_world_intervals.csv": _frames,
+        "active_learning.csv": _labels,
+        "recovery_intervals.csv": _recovery,
     }
     findings: list[Finding] = []
-    for name, (read, find) in readers.items():
+    for name, find in readers.items():
         if (folder / name).is_file():
-            findings += find(read(folder / name), titles)
+            findings += find(read_rows(folder / name), titles)
     return [finding for finding in findings if finding.result in shown]
 
 

@@ -43,7 +43,7 @@ def embed_without(job: Job) -> None:
 
     settings = EncoderSettings(**job.settings)
     with record_provenance([job.out], [job.registrations], job.settings, seed=job.seed):
-        registrations = Registrations.load(job.registrations, (job.source, job.seed))
+        registrations = Registrations.load(job.registrations, job.axes)
         train = registrations.rows("train")
         arrays = {"sample": registrations.sample, "split": registrations.split}
         for held_out in job.concepts:
@@ -59,62 +59,58 @@ def learn_actively(job: Job) -> None:
     for strategy in job.strategies:
         require_known("strategy", strategy, (*strategies(), *STREAMS))
     inputs = [job.registrations, job.embeddings, job.embeddings_without]
-    axes = (job.source, job.seed)
     with record_provenance(job.out, inputs, job.settings, seed=job.seed):
         settings = ActiveLearningSettings.from_dict(job.settings)
         stream, held_out = StreamSettings(**job.settings.get("stream", {})), job.settings.get("held_out", CONCEPTS)
         curves: dict[str, dict] = {strategy: {} for strategy in job.strategies}
-        loaded = Registrations.load(job.registrations, axes)
+        loaded = Registrations.load(job.registrations, job.axes)
         registrations = replace(loaded, attached=read_embedding(job.embeddings, loaded))
         unseen = load_embeddings(job.embeddings_without, registrations, {f"h_{c}": ("S", "d") for c in held_out})
         embedded = [("pretrained", c, registrations.embedding) for c in held_out]
         embedded += [("unseen", c, unseen[f"h_{c}"]) for c in held_out]
         for setting, concept, h_S_d in progress(embedded, f"active learning on {job.source}"):
-            task = make_task(replace(registrations, attached={"embedding": h_S_d}), concept, settings, *axes)
-            gpc = initial_gpc(task, settings, *axes, setting)
+            task = make_task(replace(registrations, attached={"embedding": h_S_d}), concept, settings, *job.axes)
+            gpc = initial_gpc(task, settings, *job.axes, setting)
             projected = task.project(gpc)
             for strategy in job.strategies:
+                given = projected, gpc, strategy, settings
                 if strategy not in STREAMS:
-                    steps = rounds(projected, gpc, strategy, settings, *axes, setting)
-                    curves[strategy][setting, concept] = [step for step, _ in steps]
+                    curves[strategy][setting, concept] = [step for step, _ in rounds(*given, *job.axes, setting)]
                 elif setting == "pretrained":
-                    curves[strategy][setting, concept] = run_stream(projected, gpc, strategy, settings, stream, *axes)
-        if (section := job.settings.get("rare")) and NEW in held_out:
-            rare = read_settings(RareSettings, section)
-            for share in rare.shares:
-                setting = rare_setting(share)
-                task = make_task(registrations, NEW, settings, *axes, new_share=share)
-                retraining = Retraining(task, rare.gpc, *axes, setting)
-                compared = (*COMPARED, REDUNDANT) if share == rare.shares[0] else COMPARED
-                shown = [name for name in job.strategies if name in compared]
-                for strategy in progress(shown, f"{setting} on {job.source}"):
-                    learned = learn(retraining, strategy, rare, [job.settings["target"]], *axes, setting)
-                    curves[strategy][setting, NEW] = learned.steps
+                    curves[strategy][setting, concept] = run_stream(*given, stream, *job.axes)
+        rare = read_settings(RareSettings, job.settings["rare"])
+        for share in rare.shares if NEW in held_out else ():
+            setting = rare_setting(share)
+            task = make_task(registrations, NEW, settings, *job.axes, new_share=share)
+            retraining = Retraining(task, rare.gpc, *job.axes, setting)
+            compared = (*COMPARED, REDUNDANT) if share == rare.shares[0] else COMPARED
+            shown = [name for name in job.strategies if name in compared]
+            for strategy in progress(shown, f"{setting} on {job.source}"):
+                learned = learn(retraining, strategy, rare, [job.settings["target"]], *job.axes, setting)
+                curves[strategy][setting, NEW] = learned.steps
         for strategy, path in zip(job.strategies, job.out, strict=True):
             write_curves(path, curves[strategy], STREAM_COLUMNS if strategy in STREAMS else POOL_COLUMNS)
 
 
 def learn_on_frames(job: Job) -> None:
     """Learn each new concept on depth frames, from the embeddings of backbones and from the pair."""
-    inputs = [job.registrations, *job.embeddings]
-    axes = (job.source, job.seed)
-    with record_provenance(job.out, inputs, job.settings, seed=job.seed):
+    with record_provenance(job.out, [job.registrations, *job.embeddings], job.settings, seed=job.seed):
         settings = read_settings(FrameLabelSettings, job.section("frame_labels"))
         # Rounds as those of a concept that is rare on whole objects, with the budget of frames.
-        rare = fields_of(job.section("active_learning").get("rare") or {}, RetrainingSettings)
+        rare = fields_of(job.section("active_learning")["rare"], RetrainingSettings)
         budget = read_settings(RetrainingSettings, rare | {"labels": settings.labels, "least": settings.least})
         start = ActiveLearningSettings(initial=settings.initial)
         curves: dict[str, dict] = {strategy: {} for strategy in job.strategies}
         for name, samples in progress(_embedded(job, settings.points), f"labels of {job.source}"):
             for concept in settings.held_out:
-                task = make_task(samples, concept, start, *axes, new_share=settings.share)
-                retraining = Retraining(task, budget.gpc, *axes, name)
+                task = make_task(samples, concept, start, *job.axes, new_share=settings.share)
+                retraining = Retraining(task, budget.gpc, *job.axes, name)
                 for strategy in job.strategies:
                     if strategy == ALL_LABELS:  # before any label, and after those of the whole pool
                         queries: list[list[int]] = [[], list(range(len(task.pool)))]
                         curve = [retraining.look(retraining.fit(queried, None), queried) for queried in queries]
                     else:
-                        curve = learn(retraining, strategy, budget, settings.targets, *axes, name).steps
+                        curve = learn(retraining, strategy, budget, settings.targets, *job.axes, name).steps
                     curves[strategy][name, concept] = curve
         for strategy, path in zip(job.strategies, job.out, strict=True):
             write_curves(path, curves[strategy], POOL_COLUMNS)
@@ -122,14 +118,13 @@ def learn_on_frames(job: Job) -> None:
 
 def _embedded(job: Job, points: int) -> Iterator[tuple[str, Embedded]]:
     """Name of each embedding, and the samples in it."""
-    registrations = Registrations.load(job.registrations, (job.source, job.seed))
+    registrations = Registrations.load(job.registrations, job.axes)
 
     def samples(h_S_d: np.ndarray) -> Embedded:
         return Embedded(h_S_d, registrations.concept, registrations.split)
 
     of_backbones = [load_embeddings(path, registrations, {"h": ("S", "d")})["h"] for path in job.embeddings]
     yield from zip(job.backbones, map(samples, of_backbones), strict=True)
-    axes = (job.source, job.seed)
-    measured_S_F = describe_registrations(registrations, *axes, points=points)["relations"]
-    normalized = NormalizedFeatures(*axes, "frame_labels").fit(measured_S_F[registrations.rows("train")])
+    measured_S_F = describe_registrations(registrations, *job.axes, points=points)["relations"]
+    normalized = NormalizedFeatures(*job.axes, "frame_labels").fit(measured_S_F[registrations.rows("train")])
     yield PAIR, samples(normalized(measured_S_F))

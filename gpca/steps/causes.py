@@ -29,8 +29,7 @@ def causes(job: Job) -> None:
     section, icp = job.settings_and_icp()
     settings = CauseSettings.from_dict(section, icp)
     objects = ObjectClouds.load(job.objects, job.source)
-    outputs = [job.causes, job.candidates, job.timings]
-    with record_provenance(outputs, [job.objects], job.settings, seed=job.seed):
+    with record_provenance([job.causes, job.candidates, job.timings], [job.objects], job.settings, seed=job.seed):
         causes, tally, icp_seconds_S = draw_causes(objects, job.source, job.seed, settings)
         causes.save(job.causes)
         tally.save(job.candidates)
@@ -57,7 +56,7 @@ def reenact(job: Job) -> None:
 def _measure(job: Job, out: Path, measure: Callable[..., tuple], *settings: Any) -> None:
     """Write what a function measures of every pair, and the seconds that it adds to those of the registrations."""
     with record_provenance([out, job.timings], [job.causes, job.causes_timings], job.settings, seed=job.seed):
-        causes = Causes.load(job.causes, (job.source, job.seed))
+        causes = Causes.load(job.causes, job.axes)
         seconds_S, icp_seconds_S = read_timings(job.causes_timings, causes.registrations)
         measured, own_S, own_icp_S = measure(causes, job.source, job.seed, *settings)
         measured.save(out)
@@ -72,21 +71,19 @@ def train_on_causes(job: Job) -> None:
 
     settings = EncoderSettings(**job.settings)
     checkpoint = job.weights.with_suffix(".checkpoint")
-    axes = (job.source, job.seed)
     outputs = [job.weights, job.curve, job.embeddings, job.timings]
-    inputs = [job.causes, job.causes_timings]
-    with record_provenance(outputs, inputs, job.settings, seed=job.seed):
-        causes = Causes.load(job.causes, axes)
+    with record_provenance(outputs, [job.causes, job.causes_timings], job.settings, seed=job.seed):
+        causes = Causes.load(job.causes, job.axes)
         registrations = causes.registrations
         seconds_S, icp_seconds_S = read_timings(job.causes_timings, registrations)
-        model, curve = train_encoder(with_label(causes), *axes, settings, checkpoint, LABELS)
+        model, curve = train_encoder(with_label(causes), *job.axes, settings, checkpoint, LABELS)
         started = perf_counter()
-        h_S_d, logits_S_C = embed(model, registrations, *axes, settings)
+        h_S_d, logits_S_C = embed(model, registrations, *job.axes, settings)
         seconds = (perf_counter() - started) / len(h_S_d)
-        write_weights(job.weights, model, axes)
+        write_weights(job.weights, model, job.axes)
         write_csv(job.curve, pd.DataFrame(curve), form="%.6g")
         arrays = {"h": h_S_d, "head_logits": logits_S_C, "sample": registrations.sample, "split": registrations.split}
-        save_arrays(job.embeddings, arrays, axes)
+        save_arrays(job.embeddings, arrays, job.axes)
         write_timings(job.timings, registrations, seconds_S + seconds, icp_seconds_S)
         checkpoint.unlink(missing_ok=True)
 
@@ -124,19 +121,19 @@ def model(job: Job) -> None:
             *("model", job.seed),
         )
         diagnoser = replace(diagnoser, levels=with_repair(diagnoser.levels, Proposed.joined(proposals), result_N_of))
-        settings, axes = EncoderSettings(**job.section("encoder")), (job.source, job.seed)
-        recovery = job.section("recovery")
-        registrations = Registrations.load(job.registrations, axes)
+        settings, recovery = EncoderSettings(**job.section("encoder")), job.section("recovery")
+        registrations = Registrations.load(job.registrations, job.axes)
         h_S_d, train = read_embedding(job.embeddings, registrations)["embedding"], registrations.rows("train")
-        gpc = GPC(CONCEPTS, GPCSettings(**job.section("gpc")), *axes)
         policy = RecoveryPolicy()
         if recovery:
             thresholds, treatments, budget = recovery["thresholds"], recovery["treatments"], recovery["loop"]["budget"]
             policy = RecoveryPolicy.of_settings(thresholds, treatments, budget, bald_N)
         Model(
             diagnoser=diagnoser,
-            encoder=TrainedEncoder.of(load_model(job.encoder, settings, axes=axes).encoder, settings),
-            gpc=gpc.fit(h_S_d[train], registrations.concept[train]),
+            encoder=TrainedEncoder.of(load_model(job.encoder, settings, axes=job.axes).encoder, settings),
+            gpc=GPC(CONCEPTS, GPCSettings(**job.section("gpc")), *job.axes).fit(
+                h_S_d[train], registrations.concept[train]
+            ),
             icp=ICPSettings(**icp),
             cloud_points=job.section("registrations").get("cloud_points", 2048),
             policy=policy,

@@ -161,7 +161,7 @@ def train(job: Job) -> None:
     checkpoint = job.embeddings.with_suffix(".checkpoint")
     [path] = job.files("registrations")
     with record_provenance([job.embeddings, job.curve], [path], job.settings, seed=job.seed):
-        registrations = Registrations.load(path, (job.source, job.seed))
+        registrations = Registrations.load(path, job.axes)
         if why := left_out(job.control, registrations, settings, encoder.backbone):
             print(f"control '{job.control}' of {job.source} is skipped: {why}", file=sys.stderr)
             arrays: dict[str, np.ndarray] = {name: np.zeros((0, 1), np.float32) for name in ("h", "head_logits")}

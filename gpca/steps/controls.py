@@ -22,7 +22,7 @@ from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.settings import read_settings
+from gpca.settings import fields_of, read_settings
 from gpca.steps import control_samples as samples
 from gpca.steps.control_samples import HARD, LABELS, PAPER, RELABELED, RETRAINED, TRANSFER, UNSEEN
 from gpca.steps.diagnosis import with_what_it_reads
@@ -40,14 +40,13 @@ def explain(job: Job) -> None:
     settings = read_settings(samples.ControlSettings, job.section("controls"))
     encoder = EncoderSettings(**job.section("encoder"))
     icp = ICPSettings(**job.section("icp"))
-    runs = {name: value for name, value in job.section("uncertainty").items() if name != "samples"}
+    uncertainty = UncertaintySettings(**fields_of(job.section("uncertainty"), UncertaintySettings), icp=icp)
     retrained = dict(zip(job.retrained, job.retrained_embeddings, strict=True))
     others = dict(zip(job.others, job.other_registrations, strict=True))
-    axes = (job.source, job.seed)
     inputs = [job.registrations, job.encoder, job.embeddings]
     inputs += [*retrained.values(), *others.values(), *job.get("all_hard", []), *job.get("all_hard_reenactments", [])]
     with record_provenance([job.predictions], inputs, job.settings, seed=job.seed):
-        registrations = Registrations.load(job.registrations, axes)
+        registrations = Registrations.load(job.registrations, job.axes)
         all_hard = read_hard(job.get("all_hard", []), job.get("all_hard_reenactments", []), job.seed)
         embeddings = {PAPER: read_embedding(job.embeddings, registrations, logits=True)}
         for control, path in retrained.items():
@@ -55,23 +54,21 @@ def explain(job: Job) -> None:
                 hard = all_hard[job.source]
                 embeddings[control] = {**hard.attached, **read_embedding(path, hard, logits=True)}
             elif not samples.left_out(control, registrations, settings, encoder.backbone):
-                changed = samples.variant(control, registrations, *axes, settings, icp)
+                changed = samples.variant(control, registrations, *job.axes, settings, icp)
                 embeddings[control] = read_embedding(path, changed, logits=True)
         experiment = ControlRun(
-            *axes,
+            *job.axes,
             settings,
             encoder.backbone,
-            UncertaintySettings(**runs, icp=icp),
+            uncertainty,
             rivals,
-            embedding_by(load_model(job.encoder, encoder, axes=axes), job.seed, encoder),
+            embedding_by(load_model(job.encoder, encoder, axes=job.axes), job.seed, encoder),
             embeddings,
             all_hard.pop(job.source, None),
             list(all_hard.values()),
         )
-        rows = experiment.run(
-            registrations, {name: Registrations.load(path, (name, job.seed)) for name, path in others.items()}
-        )
-        write_csv(job.predictions, rows)
+        asked = {name: Registrations.load(path, (name, job.seed)) for name, path in others.items()}
+        write_csv(job.predictions, experiment.run(registrations, asked))
 
 
 def read_hard(paths: Sequence[Path], reenactments: Sequence[Path], seed: int) -> dict[str, Registrations]:
@@ -123,9 +120,7 @@ class ControlRun:
         for control in admitted:
             if control != TRANSFER:
                 changed = self._changed(control, plain, embeds)
-                asked: dict[tuple[str, str], Registrations] = {
-                    (control, self.source): changed.subset(changed.rows("test"))
-                }
+                asked = {(str(control), self.source): changed.subset(changed.rows("test"))}
                 frames += self._explained(control, changed, asked)
         return pd.concat(frames, ignore_index=True)
 
@@ -198,9 +193,8 @@ class ControlRun:
                 train = samples.relabeled(control, train, *axes, *([part] if control == "shuffled" else []))
             for name, rival in self.rivals.items():
                 explainer = rival.made()
-                if control in RELABELED and getattr(explainer, "trained_with_encoder", False):
-                    continue
-                if control != HARD and rival.reads == REENACTED:
+                knows_labels = control in RELABELED and getattr(explainer, "trained_with_encoder", False)
+                if knows_labels or (control != HARD and rival.reads == REENACTED):
                     continue
                 explainer.fit(_learned_from(rival, train))
                 for (name_of_test, source), test in asked.items():

@@ -88,7 +88,7 @@ def diagnose_frames(job: Job) -> None:
     learned, enacted = learned_files(job), job.get("frame_reenactments")
     inputs = [job.frame_causes, *filter(None, [enacted]), *(path for paths in learned.values() for path in paths)]
     with record_provenance([job.predictions], inputs, job.settings, seed=job.seed):
-        causes = Causes.load(job.frame_causes, (job.source, job.seed))
+        causes = Causes.load(job.frame_causes, job.axes)
         frames = frames_to_explain(job, causes, enacted, learned)
         write_csv(job.predictions, frames.predictions(job.section("explainers"), causes.registrations))
 
@@ -179,7 +179,7 @@ class World:
         fold_S: np.ndarray | None = None,
         apart: bool = False,
     ) -> None:
-        self._axes, self._files, self._registrations = (job.source, job.seed), files, registrations
+        self._axes, self._files, self._registrations = job.axes, files, registrations
         self._read, self._fold_S = read, fold_S
         self._left_out = np.unique(registrations.cluster) if apart else ()
         self._encoder = EncoderSettings(**job.section("encoder"))
@@ -248,7 +248,6 @@ class World:
         return Attribution.of_scores(
             LABELS,
             np.mean(all_scores, axis=0),
-            seconds=0.0,
             icp_calls=self._calls(entry.sees),
             abstained_N=np.all(all_abstained, axis=0),
         )

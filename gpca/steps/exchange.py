@@ -22,7 +22,7 @@ from gpca.pairs.dataset import Registrations, ragged
 from gpca.pairs.judge import Judges
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.rigid import scale_translation, transform
-from gpca.settings import Bounds, Count, Distinct, read_settings
+from gpca.settings import Bounds, Count, Distinct, fields_of, read_settings
 from gpca.steps.registration_trials import outcomes_by
 from gpca.uncertainty.designs import ADDITIVE_KNOBS
 from gpca.uncertainty.estimators.registry import make_estimator
@@ -57,14 +57,13 @@ def run(job: Job) -> None:
     settings = read_settings(ExchangeSettings, job.section("exchange"))
     encoder = EncoderSettings(**job.section("encoder"))
     methods, estimators = job.by_name("methods", settings.methods), job.by_name("estimators", settings.estimators)
-    uncertainty = {name: value for name, value in job.section("uncertainty").items() if name != "samples"}
+    uncertainty = UncertaintySettings(**fields_of(job.section("uncertainty"), UncertaintySettings))
     objects = ObjectClouds.load(job.objects, job.source)
     for seed, registrations_path, weights, out in job.per_seed("registrations", "encoders", "out"):
         rivals = make_rivals(job.section("explainers"), job.source, seed)
         with record_provenance([out], [job.objects, registrations_path, weights], job.settings, seed=seed):
             embedded = embedding_by(load_model(weights, encoder, axes=(job.source, seed)), seed, encoder)
-            sections = settings, methods, estimators, UncertaintySettings(**uncertainty)
-            exchange = Exchange(job.source, seed, *sections, rivals, embedded)
+            exchange = Exchange(job.source, seed, settings, methods, estimators, uncertainty, rivals, embedded)
             judges = Judges(objects, f"objects of {job.source}")
             write_csv(out, exchange.run(Registrations.load(registrations_path, (job.source, seed)), judges))
 
@@ -155,7 +154,7 @@ class Exchange:
                         explainer, test_estimates.attach_to(test.without_labels(), estimated, conditions, floor)
                     )
                     scores_S_C[estimated], abstained_S[estimated] = attributed.scores_N_C, attributed.abstained_N
-                attribution = Attribution.of_scores(CONCEPTS, scores_S_C, seconds=0.0, abstained_N=abstained_S)
+                attribution = Attribution.of_scores(CONCEPTS, scores_S_C, abstained_N=abstained_S)
                 labels = dict(zip(LABELS, (ESTIMATOR, estimator, estimator, name), strict=True))
                 yield prediction_frame(test, attribution, **labels).assign(**{FAILURE: failure_S})
 

@@ -128,7 +128,7 @@ def frame_causes(job: Job) -> None:
     with record_provenance(outputs, inputs, job.settings, seed=job.seed):
         instances, objects = _instances(job, job.source)
         own, datasets = read_settings(FrameCauseSettings, job.section("frames")), _datasets(job)
-        models, axes = models_of(datasets), (job.source, job.seed)
+        models, axes = models_of(datasets), job.axes
         starts = chosen_starts(all_starts(instances, objects, datasets, models, own.rungs), instances, job.source, own)
         meshes = meshes_of(models, objects, instances.object_index[starts.instance].tolist())
         settings = CauseSettings.from_dict(job.section("causes"), job.section("icp"))
@@ -169,7 +169,7 @@ def reenact_frames(job: Job) -> None:
 
     settings = read_settings(ReenactmentSettings, job.section("reenactment"))
     truth = CauseSettings.from_dict(job.section("causes"), job.section("icp"))
-    inputs, axes = _inputs(job, job.frame_causes, job.starts, job.instances, job.objects), (job.source, job.seed)
+    inputs, axes = _inputs(job, job.frame_causes, job.starts, job.instances, job.objects), job.axes
     with record_provenance([job.reenactments], inputs, job.settings, seed=job.seed):
         causes, starts = Causes.load(job.frame_causes, axes), Starts.load(job.starts, axes)
         instances, objects = _instances(job, job.source)

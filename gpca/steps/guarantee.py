@@ -16,7 +16,6 @@ from gpca.guarantee.answers import SCORES, Scored
 from gpca.guarantee.guarantee import states_of
 from gpca.io.container import require_same_samples
 from gpca.io.csv_file import ANY, read_csv
-from gpca.io.files import Axes
 from gpca.io.frame import Frame
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
@@ -36,13 +35,14 @@ def read_pool(causes_files: Sequence[Path], descriptors: Sequence[Path], reenact
     """Read the registrations of every source and seed; the files of all three lists have one order."""
     parts, columns = [], []
     for path, described, enacted in zip(causes_files, descriptors, reenactments, strict=True):
-        causes = Causes.load(path)
+        axes = path.parent.name, seed_of_file(path)
+        causes = Causes.load(path, axes)
         state = states_of(causes.truth)
         rows = np.flatnonzero(state != BORDERLINE)
         registrations = with_what_it_reads(labeled(causes), DESCRIBED, described)
         parts.append(with_what_it_reads(registrations, REENACTED, enacted).subset(rows))
         keys = _keys(parts[-1].split, parts[-1].sample)  # as in the files; joined samples are numbered anew
-        columns.append((*(np.full(len(rows), axis) for axis in axes_of(causes)), keys, state[rows]))
+        columns.append((*(np.full(len(rows), axis) for axis in axes), keys, state[rows]))
     registrations, count = Registrations.joined(parts), sum(map(len, parts))
     source_N, seed_N, sample_N, state_N = (np.concatenate(column) for column in zip(*columns, strict=True))
     # The largest severity of any cause, as a share of the most in any sample.
@@ -59,11 +59,6 @@ def read_pool(causes_files: Sequence[Path], descriptors: Sequence[Path], reenact
         weight=np.ones(count),
         scores=np.zeros((count, len(LABELS))),
     )
-
-
-def axes_of(causes: Causes) -> Axes:
-    assert causes.registrations.axes is not None  # every file of registrations has them
-    return causes.registrations.axes
 
 
 def parts_of(family_N: np.ndarray, fold_N: np.ndarray) -> np.ndarray:
@@ -122,8 +117,7 @@ def scored_on_frames(frames: Sequence[tuple[Path, Path, Path]], name: str, as_is
         causes, samples = Causes.load(causes_file), read_csv(sample_file, FRAME_COLUMNS, others=ANY)
         predictions = read_predictions(prediction_file, labels=("explainer",))
         predicted = _predicted(predictions[predictions["explainer"] == name])
-        registrations, state = causes.registrations, states_of(causes.truth)
-        _, seed = axes_of(causes)
+        registrations, state, seed = causes.registrations, states_of(causes.truth), seed_of_file(causes_file)
         numbers = registrations.sample.astype(str)
         require_same_samples(sample_file, samples, registrations.arrays, "causes of frames", ("sample",))
         rows = np.flatnonzero((state != BORDERLINE) & (samples["truth"] != BY_ICP).to_numpy())

@@ -67,9 +67,7 @@ def evaluate_grid(registrations: Registrations, grid: KernelGrid, source: str, s
         gpc = GPC(CONCEPTS, settings, source, seed)
         for iterations in gpc.fit_up_to(grid.iterations, h_S_d[train], concept_S[train]):
             scores_N_C, variances_N_C, bald_N = gpc.attribute(h_S_d[test])
-            attribution = Attribution.of_scores(
-                CONCEPTS, scores_N_C, seconds=0.0, variances_N_C=variances_N_C, bald_N=bald_N
-            )
+            attribution = Attribution.of_scores(CONCEPTS, scores_N_C, variances_N_C=variances_N_C, bald_N=bald_N)
             setting = dict(zip(SETTING, (kernel, rate, iterations), strict=True))
             predictions.append(prediction_frame(tested, attribution, **setting))
             measured = (

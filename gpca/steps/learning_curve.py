@@ -68,7 +68,7 @@ def learning_samples(job: Job) -> None:
     with record_provenance([job.samples], [job.objects], job.settings, seed=job.seed):
         objects = ObjectClouds.load(job.objects, job.source)
         samples = describe(draw_further(objects, job.source, job.seed, settings, chunk, wanted), ICPSettings(**icp))
-        samples.subset(np.isin(samples.concept, LABELS)).save(job.samples, (job.source, job.seed))
+        samples.subset(np.isin(samples.concept, LABELS)).save(job.samples, job.axes)
 
 
 def describe(causes: Causes, icp: ICPSettings) -> LabeledSamples:
@@ -85,23 +85,20 @@ def describe(causes: Causes, icp: ICPSettings) -> LabeledSamples:
 def learn_from_more(job: Job) -> None:
     """Pool the training samples of all sources, and learn from more and more of them."""
     settings = read_settings(CurveSettings, job.section("learning_curve"))
-    axes = (job.source, job.seed)
     inputs = [*job.causes, *job.descriptors, *job.samples]
     with record_provenance([job.out], inputs, job.settings, seed=job.seed):
         sets = {}
         for path, descriptors in zip(job.causes, job.descriptors, strict=True):
             causes = Causes.load(path)
             registrations = with_what_it_reads(labeled(causes), DESCRIBED, descriptors)
-            sets[registrations.axes or axes] = causes, registrations
-        causes, registrations = sets[axes]
+            sets[registrations.axes or job.axes] = causes, registrations
+        causes, registrations = sets[job.axes]
         test = causes.rows("test")
         parts = [LabeledSamples.of(every.subset(training_rows(every, job.causes[0]))) for _, every in sets.values()]
         parts += [LabeledSamples.load(path) for path in job.samples]
         pool = joined_without(registrations.cluster[test], parts)
-        write_csv(
-            job.out,
-            learning_curve(pool, LabeledSamples.of(registrations.subset(test)), causes.subset(test), settings, *axes),
-        )
+        tested = LabeledSamples.of(registrations.subset(test))
+        write_csv(job.out, learning_curve(pool, tested, causes.subset(test), settings, *job.axes))
 
 
 def learning_curve(
@@ -114,9 +111,8 @@ def learning_curve(
     if not sizes:
         fault = f"{len(pool)} training samples of other families are fewer than the least size, {min(settings.sizes)}"
         raise InputError(f"learning curve of {source}", fault, "raise learning_curve.further or lower its sizes")
-    orders = [
-        generator(source, seed, "learning curve", "order", i).permutation(len(pool)) for i in range(settings.orders)
-    ]
+    draws = [generator(source, seed, "learning curve", "order", i) for i in range(settings.orders)]
+    orders = [random.permutation(len(pool)) for random in draws]
 
     def values(judged: Judged) -> list[float]:
         measured = measure(judged, np.ones((1, len(judged))))
@@ -125,33 +121,28 @@ def learning_curve(
     rows = [(CEILING, 0, 0, *values(ceiling_of(truth, seed)))]
     fits = [(name, size, i) for size in sizes for i in range(settings.orders) for name in LEARNERS]
     for name, size, i in progress(fits, f"learning curve of {source}, seed {seed}"):
-        fit = _fit_trees if name == "trees" else _fit_gpca
-        learned, given = pool.subset(orders[i][:size]), (source, seed, "learning curve", name, size, i)
-        scores_N_4 = fit(learned, tested.features, settings.classifier, *given)
-        attribution = Attribution.of_scores(LABELS, scores_N_4, seconds=0.0)
+        learned, axes = pool.subset(orders[i][:size]), (source, seed, "learning curve", name, size, i)
+        scores_N_4 = _scores(name, learned, tested.features, settings.classifier, *axes)
+        attribution = Attribution.of_scores(LABELS, scores_N_4)
         judged = judged_by(prediction_frame(truth.registrations, attribution), truth, seed)
         rows.append((name, size, i, *values(judged)))
     return pd.DataFrame(rows, columns=list(CURVE_COLUMNS))
 
 
-def _fit_trees(learned: LabeledSamples, tested_N_F: np.ndarray, _settings: GPCSettings, *axes: object) -> np.ndarray:
-    """Scores (N, 4) by extremely randomized trees (Geurts et al. 2006), as in the explainers of descriptors."""
+def _scores(
+    name: str, learned: LabeledSamples, tested_N_F: np.ndarray, settings: GPCSettings, *axes: object
+) -> np.ndarray:
+    """Scores (N, 4) by extremely randomized trees, or by the classifier on ranks of the descriptors (``gpca_pair``)."""
     from sklearn.ensemble import ExtraTreesClassifier
 
-    from gpca.explainers.classifiers import ConceptClassifier
-
-    state = seed_of(*axes) % 2**32
-    forest = ExtraTreesClassifier(TREES, min_samples_leaf=2, max_features=0.3, random_state=state)
-    return ConceptClassifier(forest, LABELS).fit(learned.features, learned.concept).scores(tested_N_F)
-
-
-def _fit_gpca(learned: LabeledSamples, tested_N_F: np.ndarray, settings: GPCSettings, *axes: object) -> np.ndarray:
-    """Scores (N, 4) by the Gaussian process classifier on ranks of the descriptors, as in ``gpca_pair``."""
     from gpca.classifier.gpc import GPC
+    from gpca.explainers.classifiers import ConceptClassifier
     from gpca.explainers.pair_classifier import NormalizedFeatures
 
-    normalized = NormalizedFeatures(*axes)
-    normalized.fit(learned.features)
-    gpc = GPC(LABELS, settings, *axes[:2])
-    gpc.fit(normalized(learned.features), learned.concept)
+    if name == "trees":
+        state = seed_of(*axes) % 2**32
+        forest = ExtraTreesClassifier(TREES, min_samples_leaf=2, max_features=0.3, random_state=state)
+        return ConceptClassifier(forest, LABELS).fit(learned.features, learned.concept).scores(tested_N_F)
+    normalized = NormalizedFeatures(*axes).fit(learned.features)
+    gpc = GPC(LABELS, settings, *axes[:2]).fit(normalized(learned.features), learned.concept)
     return gpc.attribute(normalized(tested_N_F))[0]

@@ -15,7 +15,7 @@ from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.objects.canonical import ObjectClouds, write_objects
 from gpca.pairs.dataset import Registrations, read_embedding, read_instances_of
-from gpca.settings import read_settings
+from gpca.settings import fields_of, read_settings
 
 EARLIER = ("earlier_seconds", "earlier_icp_seconds")  # spent before an explainer starts
 
@@ -50,12 +50,11 @@ def uncertainty(job: Job) -> None:
     from gpca.uncertainty.settings import UncertaintySettings
 
     own, icp = job.settings_and_icp()
-    samples = own.pop("samples", None)
-    settings = UncertaintySettings(**own, icp=ICPSettings(**icp))
+    settings = UncertaintySettings(**fields_of(own, UncertaintySettings), icp=ICPSettings(**icp))
     for seed, registrations_path, out, table, timings in job.per_seed("registrations", "outcomes", "tables", "timings"):
         with record_provenance([out, table, timings], [registrations_path], job.settings, seed=seed):
             registrations = Registrations.load(registrations_path, (job.source, seed))
-            chosen = registrations.subset(design_rows(registrations, job.design, samples))
+            chosen = registrations.subset(design_rows(registrations, job.design, own.get("samples")))
             outcomes, *seconds = evaluate_design(job.design, chosen, job.source, seed, settings)
             outcomes.save(out, (job.source, seed))
             outcomes.write_table(table, DESIGNS[job.design].conditions)
@@ -88,7 +87,7 @@ def train(job: Job) -> None:
     with record_provenance([job.weights, job.curve], inputs, job.settings, seed=job.seed):
         seen = read_as(settings.reading, registrations, icp)
         model, curve = train_encoder(seen, job.source, job.seed, settings, checkpoint, start=start, group_S=instance_S)
-        write_weights(job.weights, model, (job.source, job.seed))
+        write_weights(job.weights, model, job.axes)
         write_csv(job.curve, pd.DataFrame(curve), form="%.6g")
         checkpoint.unlink(missing_ok=True)
 
@@ -100,17 +99,17 @@ def embed(job: Job) -> None:
 
     of_encoder, of_icp = job.settings_and_icp()
     settings, icp = EncoderSettings(**of_encoder), ICPSettings(**of_icp)
-    inputs, axes = [job.registrations, job.encoder], (job.source, job.seed)
+    inputs = [job.registrations, job.encoder]
     with record_provenance([job.embeddings, job.timings], inputs, job.settings, seed=job.seed):
-        registrations = Registrations.load(job.registrations, axes)
+        registrations = Registrations.load(job.registrations, job.axes)
         seconds_S, icp_seconds_S = read_timings(job.registration_timings, registrations)
         model = load_model(job.encoder, settings, axes=(job.get("encoder_of", job.source), job.seed))
         started = perf_counter()
         seen = read_as(settings.reading, registrations, icp)
-        h_S_d, logits_S_C = embed(model, seen, *axes, settings)
+        h_S_d, logits_S_C = embed(model, seen, *job.axes, settings)
         seconds = (perf_counter() - started) / len(h_S_d)
         arrays = {"h": h_S_d, "head_logits": logits_S_C, "sample": registrations.sample, "split": registrations.split}
-        save_arrays(job.embeddings, arrays, axes)
+        save_arrays(job.embeddings, arrays, job.axes)
         write_timings(job.timings, registrations, seconds_S + seconds, icp_seconds_S)
 
 
@@ -126,8 +125,7 @@ def reduce(job: Job) -> None:
     for seed, embeddings, out in job.per_seed("embeddings", "out"):
         with record_provenance([out], [embeddings], job.settings, seed=seed):
             arrays = load_arrays(embeddings, EMBEDDING_SHAPES, EMBEDDING_KINDS, (job.source, seed))
-            h_S_d = arrays["h"]
-            axes = (job.source, seed, "reduction")
+            h_S_d, axes = arrays["h"], (job.source, seed, "reduction")
             reduced_S_c = reduce(job.reduction, h_S_d[arrays["split"] == "train"], h_S_d, job.settings, *axes)
             save_arrays(out, {name: arrays[name] for name in EMBEDDING_SHAPES} | {"h": reduced_S_c}, (job.source, seed))
 

@@ -105,7 +105,7 @@ class Attempts(Container):
 
 def attempt(job: Job) -> None:
     """Ask about the test registrations of a file of causes; scans and frames bring samples and re-enactments."""
-    settings, axes = read_settings(RepairSettings, job.section("repair")), (job.source, job.seed)
+    settings, axes = read_settings(RepairSettings, job.section("repair")), job.axes
     truth = CauseSettings.from_dict(job.section("causes"), job.section("icp"))
     reenactment = read_settings(ReenactmentSettings, job.section("reenactment"))
     optional = {name: job.get(name) for name in ("objects", "samples", "reenactments")}

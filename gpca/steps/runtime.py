@@ -39,16 +39,15 @@ Times = Iterator[tuple[tuple[str, str], float]]  # (component, device) and its s
 
 
 def run(job: Job) -> None:
-    axes = (job.source, job.seed)
     inputs = [job.model, job.registrations, job.embeddings]
     with record_provenance([job.out], inputs, job.settings, seed=job.seed):
         model = Model.load(job.model)
-        registrations = Registrations.load(job.registrations, axes)
+        registrations = Registrations.load(job.registrations, job.axes)
         embedded = replace(registrations, attached=read_embedding(job.embeddings, registrations))
         settings = ActiveLearningSettings.from_dict(job.section("active_learning"))
-        task = make_task(embedded, "overlap", settings, *axes)
+        task = make_task(embedded, "overlap", settings, *job.axes)
         repeats = job.section("runtime").get("repeats", 100)
-        write_csv(job.out, measure(model, registrations, task, settings, repeats, job.threads, *axes))
+        write_csv(job.out, measure(model, registrations, task, settings, repeats, job.threads, *job.axes))
 
 
 def measure(

@@ -36,7 +36,7 @@ def measure(job: Job) -> None:
     own = read_settings(ScanSamples, job.section("samples"))
     outputs = [job.scan_causes, job.samples, job.descriptors, job.reenactments]
     with record_provenance(outputs, job.get("data", []), job.settings, seed=job.seed):
-        axes, section = (job.source, job.seed), job.section("scans")
+        axes, section = job.axes, job.section("scans")
         chosen = drawn_pairs(job, section | {"pairs": own.pairs})
         kept = np.sort(generator(*axes, "scan causes", "pairs").permutation(len(chosen))[: own.most_pairs])
         pairs = ScanPairs.of([chosen[k] for k in kept])

@@ -39,7 +39,7 @@ class TrialSettings:
 def draw_scans(job: Job) -> None:
     """Read or make the scenes of a data set of scans and draw pairs of each scene and stratum of overlap."""
     with record_provenance([job.out], job.get("data", []), job.settings, seed=job.seed):
-        ScanPairs.of(drawn_pairs(job, job.section("choice"))).save(job.out, (job.source, job.seed))
+        ScanPairs.of(drawn_pairs(job, job.section("choice"))).save(job.out, job.axes)
 
 
 def drawn_pairs(job: Job, choice: Mapping[str, Any]) -> list[ScanPair]:
@@ -57,7 +57,7 @@ def register(job: Job) -> None:
     settings = read_settings(TrialSettings, fields_of(job.section("scans"), TrialSettings))
     methods = job.by_name("methods", job.methods)
     with record_provenance([*job.rows, *job.timings], [job.scans], job.settings, seed=job.seed):
-        pairs = ScanPairs.load(job.scans, (job.source, job.seed))
+        pairs = ScanPairs.load(job.scans, job.axes)
         trials = try_methods(pairs, job.source, job.seed, methods, settings)
         write_trials(trials.values(), job.rows, job.timings)
 

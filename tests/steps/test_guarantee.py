@@ -63,7 +63,7 @@ def files(causes, tmp_path_factory):
     given = {name: [paths[name] for paths in of_axes] for name in of_axes[0]}
     frames = causes.subset(causes.rows("test"))
     frames = replace(frames, registrations=replace(frames.registrations, axes=("real_rgbd", 100)))
-    given |= {name: [folder / f"{name}.{kind}"] for name, kind in FRAMES.items()}
+    given |= {name: [folder / name / f"seed100.{kind}"] for name, kind in FRAMES.items()}
     frames.save(given["frame_causes"][0])
     numbers = frames.registrations.sample
     samples = {"sample": numbers, "instance": numbers // 2, "truth": "annotated"}

@@ -20,6 +20,7 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.shifted_sets import ShiftedSets
 from gpca.process.registry import load
 from gpca.seeds import seed_of_file
+from gpca.settings import fields_of
 from gpca.steps.readings.groups import GROUPS, Reading, ReadingSizes, name_of, readings_of
 from gpca.uncertainty.settings import UncertaintySettings
 
@@ -46,7 +47,7 @@ class RunFiles:
 
     def uncertainty(self) -> UncertaintySettings:
         """Settings of Monte-Carlo ICP under fixed knobs."""
-        runs = {name: value for name, value in self.section("uncertainty").items() if name != "samples"}
+        runs = fields_of(self.section("uncertainty"), UncertaintySettings)
         return UncertaintySettings(**runs, icp=ICPSettings(**self.section("icp")))
 
     def loaded(self) -> Iterator[tuple[str, int, Registrations]]:

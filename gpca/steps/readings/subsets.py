@@ -73,17 +73,16 @@ def retrain(job: Job) -> None:
     from gpca.encoders.training import embedding_by, train_encoder
     from gpca.steps.shift import ShiftSettings, make_sets
 
-    axes = (job.source, job.seed)
     parts = {name: job.section(name) for name in ("shift", "registrations", "encoder")}
     settings, encoder_settings = ShiftSettings.from_dicts(**parts), EncoderSettings(**parts["encoder"])
     checkpoint = job.out.with_suffix(".checkpoint")  # no output of the rule: a rerun continues from it
     with record_provenance([job.out], [job.objects], job.settings, seed=job.seed):
         objects = ObjectClouds.load(job.objects, job.source)
-        samples, _ = make_registrations(objects, *axes, read_settings(RegistrationSettings, parts["registrations"]))
-        model, _ = train_encoder(samples, *axes, encoder_settings, checkpoint)
+        samples, _ = make_registrations(objects, *job.axes, read_settings(RegistrationSettings, parts["registrations"]))
+        model, _ = train_encoder(samples, *job.axes, encoder_settings, checkpoint)
         embed_own = embedding_by(model, job.seed, encoder_settings)
         samples = replace(samples, attached={"embedding": embed_own(samples, job.source)[0]})
-        make_sets(objects, samples, None, embed_own, *axes, settings, unseen_objects=False).save(job.out, axes)
+        make_sets(objects, samples, None, embed_own, *job.axes, settings, unseen_objects=False).save(job.out, job.axes)
         checkpoint.unlink(missing_ok=True)
 
 
