@@ -199,9 +199,12 @@ def read_seconds(files: Paths) -> Frame:
     columns = ("sample", "start", "seconds")
     rows = evaluated.read_samples(files, lambda path: read_numbers(path, columns, ("seconds",)))
     named = [row_name(row.method.removeprefix("method_"), row.start) for row in rows.itertuples()]
-    seconds = {"seconds": Measure("seconds", (0, inf))}
-    rows = rows.assign(table=NAME, method=named)
-    return evaluated.per_seed(rows, lambda subset: {ALL: np.ones(len(subset), bool)}, seconds)
+    return mean_seconds(rows.assign(table=NAME, method=named))
+
+
+def mean_seconds(rows: Frame) -> Frame:
+    whole = partial(evaluated.by_value, column="", values=())
+    return evaluated.per_seed(rows, whole, {"seconds": Measure("seconds", (0, inf))})
 
 
 SECTION = "Beyond the paper: registration methods"

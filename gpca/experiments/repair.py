@@ -1,6 +1,6 @@
 """Repair: another pose in the place of a wrong one, and rivals that register again (Table XX)."""
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from gpca.alignment.methods.registry import installed, method_entry, method_module
-from gpca.declarations import Experiment, Frame, Paths, Plan, Run, Step, Wildcards, numbers, table
+from gpca.declarations import Experiment, Frame, Paths, Run, Step, numbers, table
 from gpca.evaluation.intervals import Clustered, weighted_mean
-from gpca.evaluation.measures import ALL, SHARE, Measure, Rivals, compared, intervals, per_seed, read_samples
+from gpca.evaluation.measures import ALL, SHARE, Rivals, by_value, compared, intervals, read_samples
+from gpca.experiments import registration_methods
 from gpca.experiments.registration_methods import missing_methods
 from gpca.experiments.scan_causes import reenactment_settings
 from gpca.frames.source import REAL_WORLD
@@ -30,7 +31,7 @@ TRACKS = {CAUSES: "Causes", HARD: "Hard", FRAMES: "Depth frames", SCANS: "Scans"
 POINTS = {"few": (0, 256), "some": (256, 512), "many": (512, inf)}  # of the smaller cloud: above, and at most
 THIRDS = ("near", "middle", "far")  # of the failed registrations, by the error of their start
 RIVAL = "rival"
-COMPARED = ("repaired", "hindsight", "right_pose")  # measures of which there are differences from the best rival
+COMPARED = ("repaired", "right_pose")  # shares of which there are differences from the best rival
 OF_REPAIR = ("several", "called", "false_alarms")  # the same for all methods, or of repair alone
 BUILT_IN = {
     REPAIR: "Repair",
@@ -55,19 +56,17 @@ EXPERIMENT = Experiment(
 )
 
 
-def own_settings(config: Mapping[str, Any], causes: Mapping, reenactment: Mapping) -> dict[str, Any]:
-    """Settings of the attempts, given what differs from `causes`, and the settings of re-enactments."""
+def own_settings(
+    config: Mapping[str, Any], causes: Mapping | None = None, reenactment: Mapping | None = None
+) -> dict[str, Any]:
+    """Settings of the attempts, given what differs from `causes`, and from the re-enactments of objects."""
     methods = {name: config["methods"][name] or {} for name in installed(config[NAME]["methods"])}
     return {
         "repair": config[NAME] | {"methods": methods},
-        "causes": config["causes"] | dict(causes),
-        "reenactment": reenactment,
+        "causes": config["causes"] | (causes or {}),
+        "reenactment": reenactment or config["diagnosis"]["reenactment"],
         "icp": config["registrations"]["icp"],
     }
-
-
-def _objects(plan: Plan, _wildcards: Wildcards) -> dict[str, Any]:
-    return own_settings(plan.config, {}, plan.config["diagnosis"]["reenactment"])
 
 
 def _outputs(track: str, source: str = "{source}") -> dict[str, str]:
@@ -82,7 +81,7 @@ ATTEMPT = Step(
     run="gpca.steps.repair:attempt",
     inputs={"objects": "objects/{source}.npz", "causes": "causes/{source}/seed{seed}.npz"},
     outputs=_outputs(CAUSES),
-    settings=_objects,
+    settings=lambda plan, _wildcards: own_settings(plan.config),
     modules=lambda plan: map(method_module, plan.names["repair_method"]),
     priority=3,
 )
@@ -91,9 +90,7 @@ ATTEMPT_HARD = replace(
     name="attempt_hard_repairs",
     inputs={"objects": "objects/{source}.npz", "causes": "hard/{source}/seed{seed}.npz"},
     outputs=_outputs(HARD),
-    settings=lambda plan, _wildcards: own_settings(
-        plan.config, plan.config["controls"]["hard"], plan.config["diagnosis"]["reenactment"]
-    ),
+    settings=lambda plan, _wildcards: own_settings(plan.config, causes=plan.config["controls"]["hard"]),
     where={"seed": "control_seed"},
 )
 ATTEMPT_FRAMES = replace(
@@ -118,7 +115,7 @@ ATTEMPT_SCANS = replace(
         "reenactments": "scan_reenactments/{source}/seed{seed}.npz",
     },
     outputs=_outputs(SCANS),
-    settings=lambda plan, _wildcards: own_settings(plan.config, {}, reenactment_settings(plan.config)),
+    settings=lambda plan, _wildcards: own_settings(plan.config, reenactment=reenactment_settings(plan.config)),
     where={"source": "scan_set", "seed": "scan_seed"},
 )
 DECIDE = Step(
@@ -145,12 +142,9 @@ def read_verdicts(path: str | Path) -> Frame:
 
 def parts_of(rows: Frame) -> Iterator[tuple[str, np.ndarray]]:
     """Parts of registrations: all, by dominant cause, number of points, error of the start, source and its kind."""
-    yield ALL, np.ones(len(rows), bool)
-    yield from ((concept, (rows["label"] == concept).to_numpy()) for concept in CONCEPTS)
-    yield from (
-        (name, ((rows["points"] > least) & (rows["points"] <= most)).to_numpy())
-        for name, (least, most) in POINTS.items()
-    )
+    yield from by_value(rows, "label", CONCEPTS).items()
+    for name, (least, most) in POINTS.items():
+        yield name, rows["points"].between(least, most, inclusive="right").to_numpy()
     if rows["failed"].any():
         edges = np.quantile(rows["start_error"][rows["failed"]], [1 / 3, 2 / 3])
         third_N = np.searchsorted(edges, rows["start_error"])
@@ -160,12 +154,9 @@ def parts_of(rows: Frame) -> Iterator[tuple[str, np.ndarray]]:
         yield from ((value, (rows[column] == value).to_numpy()) for value in values if len(values) > 1)
 
 
-def rivals_of(name: str, names: Collection[str]) -> list[str]:
-    """Rivals of repair: methods with tests of their own."""
-    return [other for other in names if name == REPAIR != other and not other.endswith(f"_{JUDGED}")]
-
-
-AGAINST: Mapping[str, Rivals] = {RIVAL: rivals_of}
+AGAINST: Mapping[str, Rivals] = {  # of repair: methods with tests of their own
+    RIVAL: lambda name, names: [each for each in names if name == REPAIR and not each.endswith(f"_{JUDGED}")]
+}
 
 
 def hindsight(rows: Frame, part_N: np.ndarray, weights_B_N: np.ndarray) -> np.ndarray:
@@ -185,46 +176,40 @@ def collect(run: Run, verdicts: str | Path) -> Frame:
 
     Differences are from the rival with a test of its own that has the most.
     """
-    [path] = [verdicts] if isinstance(verdicts, (str, Path)) else verdicts
-    return measured(read_verdicts(path))
+    return measured(read_verdicts(verdicts))
 
 
 def measured(verdicts: Frame) -> Frame:
     records: list[tuple] = []
     for track, rows in verdicts.groupby("track", sort=False):
         by_method = {str(name): subset.reset_index(drop=True) for name, subset in rows.groupby("method", sort=False)}
-        asked = by_method[REPAIR]
+        asked, keys = by_method[REPAIR], (NAME, str(track))
         draws = Clustered.drawn(asked["seed"], asked["source"] + "/" + asked["cluster"], "repair intervals", track)
-        failed_N, called_N = asked["failed"].to_numpy(), asked["called"].to_numpy()
+        is_failed_N, called_N = asked["failed"].to_numpy(), asked["called"].to_numpy()
         for part, part_N in parts_of(asked):
-            metrics = {
-                "repaired": (part_N & failed_N, lambda each: each["replaced"] & each["right"]),
-                "right_pose": (part_N & failed_N, lambda each: each["right_pose"]),
-                "several": (part_N & failed_N, lambda each: each["several"]),
-                "called": (part_N & failed_N, lambda each: each["called"]),
-                "false_alarms": (part_N & ~failed_N, lambda each: each["called"]),
-                "harmed": (part_N & ~failed_N, lambda each: each["replaced"] & ~each["right"]),
+            failed_N, good_N = part_N & is_failed_N, part_N & ~is_failed_N
+            shares = {
+                "repaired": (failed_N, lambda each: each["replaced"] & each["right"]),
+                "right_pose": (failed_N, lambda each: each["right_pose"]),
+                "several": (failed_N, lambda each: each["several"]),
+                "called": (failed_N, lambda each: each["called"]),
+                "false_alarms": (good_N, lambda each: each["called"]),
+                "harmed": (good_N, lambda each: each["replaced"] & ~each["right"]),
             }
-            for metric, (mask_N, value) in metrics.items():
+            for metric, (mask_N, share) in shares.items():
                 if mask_N.any():
-                    drawn = draws.subset(mask_N)
-                    named = [REPAIR] if metric in OF_REPAIR else by_method
-                    values = {
-                        name: weighted_mean(value(by_method[name])[mask_N].to_numpy(float), drawn.weights)
-                        for name in named
-                    }
+                    drawn, named = draws.subset(mask_N), [REPAIR] if metric in OF_REPAIR else by_method
+                    values = {name: weighted_mean(share(by_method[name])[mask_N], drawn.weights) for name in named}
                     against = AGAINST if metric in COMPARED else None
-                    records += compared((NAME, str(track)), metric, part, values, drawn, SHARE, against)
-            if (mask_N := part_N & failed_N).any():
-                drawn = draws.subset(mask_N)
+                    records += compared(keys, metric, part, values, drawn, SHARE, against)
+            if failed_N.any():
                 values = {name: hindsight(each, part_N, draws.weights) for name, each in by_method.items()}
-                records += compared((NAME, str(track)), "hindsight", part, values, drawn, SHARE, AGAINST)
+                records += compared(keys, "hindsight", part, values, draws.subset(failed_N), SHARE, AGAINST)
             for name, each in by_method.items():
-                mask_N = part_N & called_N & each["replaced"].to_numpy()
-                if mask_N.any():
+                if (mask_N := part_N & called_N & each["replaced"].to_numpy()).any():
                     drawn = draws.subset(mask_N)
-                    values = {name: weighted_mean(~each["right"][mask_N].to_numpy(bool), drawn.weights)}
-                    records += compared((NAME, str(track)), "wrong", part, values, drawn)
+                    values = {name: weighted_mean(~each["right"][mask_N], drawn.weights)}
+                    records += compared(keys, "wrong", part, values, drawn)
     return intervals(records, "repairs")
 
 
@@ -235,8 +220,7 @@ def read_seconds(files: Paths) -> Frame:
 
 
 def mean_seconds(rows: Frame) -> Frame:
-    mean = {"seconds": Measure("seconds", (0, inf))}
-    return per_seed(rows.assign(table=NAME, source=CAUSES), lambda each: {ALL: np.ones(len(each), bool)}, mean)
+    return registration_methods.mean_seconds(rows.assign(table=NAME, source=CAUSES))
 
 
 SECTION = "Beyond the paper: registration methods"
@@ -255,17 +239,14 @@ SECONDS = show("seconds", "ms", factor=1e3, frame="seconds", interval=False, lim
 
 def titles_of(config: Mapping[str, Any]) -> dict[str, str]:
     """Titles of the rows by name: repair, and rivals by their best tests and by the judge."""
-    names = installed(config[NAME]["methods"])
-    titles = BUILT_IN | {name: method_entry(name).title for name in names}
-    both = ((name, title) for name, title in titles.items() if name != REPAIR)
-    return titles | {f"{name}_{JUDGED}": f"{title}, by the judge" for name, title in both}
+    titles = BUILT_IN | {name: method_entry(name).title for name in installed(config[NAME]["methods"])}
+    return titles | {f"{name}_{JUDGED}": f"{title}, by the judge" for name, title in titles.items() if name != REPAIR}
 
 
 def repair_sheet(titles: Mapping[str, str], intervals: Frame, seconds: Frame) -> Sheet:
     """Rows of all tracks and methods; the seconds are those of objects."""
-    axes = ("source", TRACKS), ("method", titles)
-    heads, columns = {"track": "Registrations", "method": "Method"}, SHOWN | {"ms": SECONDS}
-    return Sheet("table20_repair", heads, crossed(*axes), columns, intervals, {"seconds": seconds})
+    heads, rows = {"track": "Registrations", "method": "Method"}, crossed(("source", TRACKS), ("method", titles))
+    return Sheet("table20_repair", heads, rows, SHOWN | {"ms": SECONDS}, intervals, {"seconds": seconds})
 
 
 @table(
@@ -311,10 +292,9 @@ def table20_lead(run: Run, intervals):
     titles |= {"few": "Up to 256 points", "some": "Up to 512", "many": "More"}
     titles |= {"near": "Start near", "middle": "Middle", "far": "Far"} | run.source_titles
     rows = [Row([part], {"source": CAUSES, "method": REPAIR, "concept": part[0]}) for part in titles.items()]
-    columns = {
-        name: replace(column, where={key: value for key, value in column.where.items() if key != "concept"})
-        for name, column in SHOWN.items()
-        if name in ("repaired", "right_pose", "hindsight", "lead")
+    columns = {  # of any part
+        name: replace(SHOWN[name], where={key: value for key, value in SHOWN[name].where.items() if key != "concept"})
+        for name in ("repaired", "hindsight", "lead", "right_pose")
     }
     sheet = Sheet("table20_lead", {"part": "Failed registrations"}, rows, columns, intervals)
     notes = (
