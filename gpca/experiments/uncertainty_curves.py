@@ -1,6 +1,7 @@
 """How useful the uncertainty of learners is: risk over coverage, reliability, uncertainty over distance (Table V)."""
 
 from collections.abc import Mapping, Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ SETS = {  # those of which Table V, alone or under shift, has ρ
     with_training_like("source"): "+ another source",
     with_training_like("objects"): "+ unseen objects",
 }
+LIKE_TRAINING = next(iter(SETS))
 COVERAGES = np.linspace(0, 1, 101)
 ENOUGH = 0.1  # the axis ignores smaller shares of the samples, where a single error decides the risk
 DISTANCE_BINS = 10  # of equally many samples
@@ -49,19 +51,18 @@ def coverage_risk(run: Run, learned: Mapping) -> Figure:
     for panel, source in zip(axes, columns, strict=True):
         for learner in reversed(shown):
             risks = []
-            for rows in _of(learned, source, learner, "in_distribution"):
+            for rows in _of(learned, source, learner, LIKE_TRAINING):
                 wrong_S = wrong(rows)[rows["max_score"].to_numpy().argsort(kind="stable")]  # from the surest on
                 kept_S = np.arange(1, len(rows) + 1)
                 risks.append(100 * np.interp(COVERAGES, kept_S / len(rows), np.cumsum(wrong_S) / kept_S))
             if risks:
-                mean, low, high = np.array([mean_interval(risk_R) for risk_R in np.transpose(risks)]).T
-                _draw_line(panel, learner, 100 * COVERAGES, mean, np.maximum(low, 0), np.minimum(high, 100))
+                mean, *bounds = np.array([mean_interval(risk_R) for risk_R in np.transpose(risks)]).T
+                _draw_band(panel, learner, 100 * COVERAGES, mean, *np.clip(bounds, 0, 100))
                 highest = max(highest, float(mean[COVERAGES >= ENOUGH].max()))
         drawn = panel.get_lines()
         if drawn and not any(curve.get_ydata().any() for curve in drawn):
             panel.text(0.5, 0.5, "no errors", transform=panel.transAxes, ha="center", va="center")
-    axes[0].set_ylabel("errors among\nthe covered (%)")
-    axes[0].set(xlim=(0, 100), ylim=(0, 1.05 * highest or 1))
+    axes[0].set(xlim=(0, 100), ylim=(0, 1.05 * highest or 1), ylabel="errors among\nthe covered (%)")
     _write_legend(drawing, shown)
     return drawing
 
@@ -83,8 +84,7 @@ def reliability(run: Run, learned: Mapping) -> Figure:
         row[0].set_ylabel(f"{in_lines(shown[learner])}\naccuracy", fontsize=style.SMALL_PT)
         for panel, source in zip(row, columns, strict=True):
             panel.plot([0, 1], [0, 1], color=style.GRAY, linewidth=0.6, linestyle=(0, (4, 3)))
-            parts = _of(learned, source, learner, "in_distribution")
-            if parts:
+            if parts := _of(learned, source, learner, LIKE_TRAINING):
                 rows = pd.concat(parts)
                 gap = _draw_reliability(panel, 1 - rows["max_score"].to_numpy(), ~wrong(rows), _look(learner)["color"])
                 words = f"ECE {gap:.3f}, $n$ = {len(rows)}"
@@ -114,27 +114,25 @@ def _draw_reliability(panel, confidence_S: np.ndarray, right_S: np.ndarray, colo
     learned=(read_with_distances, (PREDICTIONS, SET_FILES)),
 )
 def uncertainty_vs_distance(run: Run, learned: Mapping) -> Figure:
-    shown, columns = _shown(run, learned)
-    parts = {key: sets_of(rows) for key, rows in learned.items() if key[0] in columns and key[1] in shown}
-    down = [name for name in SETS if any(name in sets for sets in parts.values())]
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+    from matplotlib.ticker import LogLocator, NullLocator
 
+    shown, columns = _shown(run, learned)
+    down = [name for name in SETS if any(_of(learned, *pair, name) for pair in product(columns, shown))]
     drawing, axes = _panels(len(down), columns, 0.9 + 1.2 * len(down), "distance to the training samples")
-    for row, name in enumerate(down):
-        for panel, source in zip(axes[row], columns, strict=True):
+    for row, name in zip(axes, down, strict=True):
+        for panel, source in zip(row, columns, strict=True):
             samples = 0
             for learner in reversed(shown):
-                seeds = [sets[name] for key, sets in parts.items() if key[:2] == (source, learner) and name in sets]
-                if seeds:
+                if seeds := _of(learned, source, learner, name):
                     distance, mean, half = distance_curve(seeds)
-                    _draw_line(panel, learner, distance, mean, np.maximum(mean - half, 0), mean + half)
+                    _draw_band(panel, learner, distance, mean, np.maximum(mean - half, 0), mean + half)
                     samples = sum(map(len, seeds))
             panel.text(0.03, 0.96, f"$n$ = {samples}", transform=panel.transAxes, va="top", fontsize=style.SMALL_PT)
-        axes[row, 0].set_ylabel(f"{SETS[name]}\n1 - largest score", fontsize=style.SMALL_PT)
+        row[0].set_ylabel(f"{SETS[name]}\n1 - largest score", fontsize=style.SMALL_PT)
     for panel in axes[-1]:
         panel.set_xscale("log")
         panel.xaxis.set_major_locator(LogLocator(base=2))
-        panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        panel.xaxis.set_major_formatter("{x:g}")
         panel.xaxis.set_minor_locator(NullLocator())
     axes[0, 0].set_ylim(bottom=0)
     _write_legend(drawing, shown)
@@ -145,24 +143,23 @@ def uncertainty_vs_distance(run: Run, learned: Mapping) -> Figure:
 def _panels(rows: int, sources: Mapping[str, str], height_in: float, across: str) -> tuple[Figure, np.ndarray]:
     """Panels with a column for each source, and what they have across."""
     drawing, axes = panels(rows, len(sources), height_in, sharex=True, sharey=True)
-    for top, bottom, title in zip(axes[0], axes[-1], sources.values(), strict=True):
-        top.set_title(title)
-        bottom.set_xlabel(across)
+    for column, title in enumerate(sources.values()):
+        axes[0, column].set_title(title)
+        axes[-1, column].set_xlabel(across)
     return drawing, axes
 
 
-def distance_curve(seeds: Sequence) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Median distance and mean of 1 - largest score of `DISTANCE_BINS` bins of equally many samples.
+def distance_curve(seeds: Sequence) -> np.ndarray:
+    """Median distance and mean of 1 - largest score (3, B) of `DISTANCE_BINS` bins of equally many samples.
 
-    The third array is half the width of the means' 95 % intervals, by the normal distribution of independent samples.
+    The third row is half the width of the means' 95 % intervals, by the normal distribution of independent samples.
     """
     distance_S, score_S = (
         np.concatenate([rows[name].to_numpy(float) for rows in seeds]) for name in (DISTANCES[0], "max_score")
     )
     bins = np.array_split(np.argsort(distance_S, kind="stable"), min(DISTANCE_BINS, len(distance_S)))
-    halves = [1.96 * score_S[part].std() / np.sqrt(max(len(part) - 1, 1)) for part in bins]
-    medians, means = [np.median(distance_S[part]) for part in bins], [score_S[part].mean() for part in bins]
-    return np.array(medians), np.array(means), np.array(halves)
+    half_B = [1.96 * score_S[part].std() / np.sqrt(max(len(part) - 1, 1)) for part in bins]
+    return np.array([[np.median(distance_S[part]) for part in bins], [score_S[part].mean() for part in bins], half_B])
 
 
 def _look(learner: str) -> dict[str, Any]:
@@ -170,7 +167,7 @@ def _look(learner: str) -> dict[str, Any]:
     return dict(zip(("color", "linestyle", "linewidth"), look, strict=True))
 
 
-def _draw_line(panel, learner: str, x: np.ndarray, y: np.ndarray, low: np.ndarray, high: np.ndarray) -> None:
+def _draw_band(panel, learner: str, x: np.ndarray, y: np.ndarray, low: np.ndarray, high: np.ndarray) -> None:
     panel.plot(x, y, **_look(learner))
     panel.fill_between(x, low, high, color=_look(learner)["color"], alpha=0.15, linewidth=0)
 
@@ -192,5 +189,6 @@ def _shown(run: Run, learned: Mapping) -> tuple[dict[str, str], dict[str, str]]:
 
 
 def _of(learned: Mapping, source: str, learner: str, name: str) -> list:
-    parts = [rows[rows["set"] == name] for key, rows in learned.items() if key[:2] == (source, learner)]
-    return [rows for rows in parts if len(rows)]
+    """Rows of a set, alone or with those that it is compared with, of each seed that has any."""
+    of_seeds = [sets_of(rows) for key, rows in learned.items() if key[:2] == (source, learner)]
+    return [sets[name] for sets in of_seeds if name in sets]
