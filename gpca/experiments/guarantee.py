@@ -162,8 +162,7 @@ def _by(variant: str, metric: str, title: str = "") -> Show:
 
 
 COLUMNS_OF_SHIFT = {
-    COVERAGE: _by(asked_for.BY_SAMPLE, COVERAGE),
-    SIZE: _by(asked_for.BY_SAMPLE, SIZE),
+    **{name: _by(asked_for.BY_SAMPLE, name) for name in (COVERAGE, SIZE)},
     "each_state_coverage": _by(asked_for.BY_STATE, COVERAGE, "Each state: coverage (%)"),
     "each_state_set_size": _by(asked_for.BY_STATE, SIZE, "Each state: states in a set"),
     **{name: _by(asked_for.BY_SAMPLE, name) for name in (MISSED, FALSE_ALARMS, UNSURE, "samples")},
@@ -212,10 +211,11 @@ def table19_shift(run: Run, measured):
     measured = measured[(measured["source"] != REAL_WORLD) | (measured["samples"] >= FEWEST_FAILURES)]
     rows = []
     for condition, explainer in product({FAMILIES: "Other families", **others, **shifts}.items(), _titles(run).items()):
-        entries = {"condition": condition[0], "method": explainer[0]}
-        every = {POOLED: "All others" if condition[0] in others else "All together"}
-        sources = every if (where(measured, entries)["source"] == POOLED).any() else titles
-        sources = titles if condition[0] == FAMILIES else {**sources, REAL_WORLD: "Depth frames"}
+        entries, sources = {"condition": condition[0], "method": explainer[0]}, titles
+        if condition[0] != FAMILIES:
+            every = {POOLED: "All others" if condition[0] in others else "All together"}
+            pooled = (where(measured, entries)["source"] == POOLED).any()
+            sources = (every if pooled else titles) | {REAL_WORLD: "Depth frames"}
         rows += [Row([condition, source, explainer], {**entries, "source": source[0]}) for source in sources.items()]
     heads = {"calibrated_on": "Calibrated on", "source": "Tested on", "explainer": "Explainer"}
     sheet = Sheet("table19_shift", heads, rows, COLUMNS_OF_SHIFT, _with_counts(measured))
@@ -244,35 +244,32 @@ def guarantee(run: Run, measured):
     from gpca.reporting.figures.panels import in_lines, legend_below, panels
     from gpca.reporting.figures.style import BLUE, COLUMN_WIDTH_IN, GRAY, GREEN, PURPLE, SMALL_PT, VERMILION
 
-    looks = {  # variant -> label, color, marker
-        asked_for.PLAIN: ("not calibrated", VERMILION, "x"),
-        asked_for.BY_SAMPLE: ("by sample", BLUE, "o"),
-        asked_for.BY_STATE: ("by sample, each state", PURPLE, "s"),
-        asked_for.BY_FAMILY: ("by family", GREEN, "^"),
+    looks = {  # variant -> label, color, marker, distance below the middle of the row
+        asked_for.PLAIN: ("not calibrated", VERMILION, "x", -0.35),
+        asked_for.BY_SAMPLE: ("by sample", BLUE, "o", -0.35 / 3),
+        asked_for.BY_STATE: ("by sample, each state", PURPLE, "s", 0.35 / 3),
+        asked_for.BY_FAMILY: ("by family", GREEN, "^", 0.35),
     }
-    limits = {name: 100 * run.config[NAME][name] for name in ("level", "missed", "false_alarms", "family_risk")}
-    shown = {  # metric -> label, and lines
-        COVERAGE: ("sets that hold\nthe state (%)", [(limits["level"], "-")]),
+    shown = {  # metric -> label, and what is guaranteed: of samples, of families
+        COVERAGE: ("sets that hold\nthe state (%)", ["level"]),
         SIZE: ("states in a set", []),
-        MISSED: ("failed called\ngood (%)", [(limits["missed"], "-"), (limits["family_risk"], "--")]),
-        FALSE_ALARMS: ("good called\nfailed (%)", [(limits["false_alarms"], "-"), (limits["family_risk"], "--")]),
+        MISSED: ("failed called\ngood (%)", ["missed", "family_risk"]),
+        FALSE_ALARMS: ("good called\nfailed (%)", ["false_alarms", "family_risk"]),
     }
     rows = _of_all_sources(where(measured, {"condition": FAMILIES, "concept": ALL}))
     titles = {name: title for name, title in _titles(run).items() if (rows["method"] == name).any()}
     page, grid = panels(2, 2, 2.1 + 0.68 * len(titles), COLUMN_WIDTH_IN, sharey=True)
-    offsets = dict(zip(looks, np.linspace(-0.35, 0.35, len(looks)), strict=True))
-    for panel, (metric, (label, lines)) in zip(grid.flat, shown.items(), strict=True):
+    for panel, (metric, (label, limits)) in zip(grid.flat, shown.items(), strict=True):
         scale = 100 if metric in SHARES else 1
-        for variant, (_, color, marker) in looks.items():
+        for variant, (_, color, marker, offset) in looks.items():
             points = where(rows, {"metric": metric, "variant": variant}).set_index("method")
-            for number, name in enumerate(titles):
+            for y, name in enumerate(titles):
                 if name in points.index:
                     low, value, high = scale * points.loc[name, ["low", "value", "high"]].to_numpy(float)
-                    y = number + offsets[variant]
-                    panel.plot([low, high], [y, y], color=color, linewidth=0.8)
-                    panel.plot(value, y, marker, color=color, markersize=3)
-        for line, style in lines:
-            panel.axvline(line, color=GRAY, linewidth=0.8, linestyle=style, zorder=0)
+                    panel.plot([low, high], [y + offset] * 2, color=color, linewidth=0.8)
+                    panel.plot(value, y + offset, marker, color=color, markersize=3)
+        for limit, dashes in zip(limits, ("-", "--"), strict=False):
+            panel.axvline(100 * run.config[NAME][limit], color=GRAY, linewidth=0.8, linestyle=dashes, zorder=0)
         panel.set_xlabel(label, fontsize=SMALL_PT)
         panel.tick_params(labelsize=SMALL_PT)
         if metric == SIZE:
@@ -284,7 +281,7 @@ def guarantee(run: Run, measured):
     grid[0, 0].set_ylim(len(titles) - 0.45, -0.55)
     handles = [
         Line2D([], [], color=color, marker=marker, markersize=3, linewidth=0.8, label=label)
-        for label, color, marker in looks.values()
+        for label, color, marker, _ in looks.values()
     ]
     handles.append(Line2D([], [], color=GRAY, linewidth=0.8, label="promised (dashed: by family)"))
     legend_below(page, handles, columns=2, fontsize=SMALL_PT)
@@ -295,10 +292,10 @@ def _with_counts(measured: Frame) -> Frame:
     """The rows, and further ones for numbers of samples and of families, and for the state with the least coverage."""
     import pandas as pd
 
-    states = measured[(measured["metric"] == COVERAGE) & (measured["concept"] != ALL)]
+    whole_N = measured["concept"] == ALL
+    states = measured[(measured["metric"] == COVERAGE) & ~whole_N]
     worst = states.loc[states.groupby(list(ROWS))["value"].idxmin()].assign(metric=WORST, concept=ALL)
-    whole = measured[measured["concept"] == ALL]
-    most = whole.groupby(list(ROWS), as_index=False)[["families", "samples", "seeds"]].max()
+    most = measured[whole_N].groupby(list(ROWS), as_index=False)[["families", "samples", "seeds"]].max()
     counts = [most.assign(metric=name, concept=ALL, value=most[name]) for name in ("families", "samples")]
     return pd.concat([measured, worst, *counts])
 

@@ -1,6 +1,7 @@
 """Learning curves: accuracy over labels as lines of panels, and numbers of labels as cells of tables."""
 
 from collections.abc import Callable, Collection, Mapping
+from itertools import product
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -52,18 +53,20 @@ def draw_curves(
         target: accuracy that a dashed line marks.
     """
     shown = {key for key in curves if key[0] in sources and key[1] in rows and key[2] in lines}
-    columns, settings, across = ([name for name in part if any(key[i] == name for key in shown)]
-                                 for i, part in enumerate((sources, rows, lines)))  # fmt: skip
     if not shown:
         raise InputError("active learning", "has no curve of these sources and strategies", "run it first")
+    present = map(set, zip(*shown, strict=True))
+    columns, settings, across = (
+        [name for name in names if name in there] for names, there in zip((sources, rows, lines), present, strict=True)
+    )
     down: list[tuple[str, list[str]]] = []
     for name in settings:
-        present = [line for line in across if any(key[1:] == (name, line) for key in shown)]
-        if len(present) <= MOST_LINES:
-            down.append((name, present))
+        drawn = [line for line in across if any(key[1:] == (name, line) for key in shown)]
+        if len(drawn) <= MOST_LINES:
+            down.append((name, drawn))
             continue
-        always = [line for line in present if styles.get(line, _OTHER)[2] > 1][: MOST_LINES - 1]
-        others = [line for line in present if line not in always]
+        always = [line for line in drawn if styles.get(line, _OTHER)[2] > 1][: MOST_LINES - 1]
+        others = [line for line in drawn if line not in always]
         groups = -(-len(others) // (MOST_LINES - len(always)))
         down += [(name, [*always, *map(str, part)]) for part in np.array_split(others, groups)]
     aim = f"target ({100 * target:g} %)"
@@ -71,28 +74,24 @@ def draw_curves(
     below = -(-len(ordered) // fitting_columns(ordered, style.TEXT_WIDTH_IN))
     height_in = 0.42 + 0.2 * below + (1.5 if len(down) < 4 else 1.25) * len(down)
     alike = len({curves[key]["labels"].iloc[-1] for key in shown}) == 1
-    sharex = True if alike else "row"
-    figure, axes = panels(len(down), len(columns), height_in, sharex=sharex, sharey=True)
-    for row, (name, group) in enumerate(down):
-        for column, source in enumerate(columns):
-            panel = axes[row, column]
+    figure, axes = panels(len(down), len(columns), height_in, sharex=True if alike else "row", sharey=True)
+    for (name, group), row in zip(down, axes, strict=True):
+        for source, panel in zip(columns, row, strict=True):
             panel.axhline(100 * target, color=style.GRAY, linewidth=0.6, linestyle=(0, (4, 3)), label=aim)
             for line in reversed(group):
                 if (source, name, line) in shown:
                     curve, (color, dashes, width) = curves[source, name, line], styles.get(line, _OTHER)
-                    look = {"color": color, "linewidth": width, "label": lines[line]}
-                    panel.plot(curve["labels"], curve["mean"], dashes, **look)
+                    panel.plot(curve["labels"], curve["mean"], dashes, color=color, linewidth=width, label=lines[line])
                     if width > 1:
                         bounds = (curve[bound].clip(0, 100) for bound in ("low", "high"))
                         panel.fill_between(curve["labels"], *bounds, color=color, alpha=0.15, linewidth=0)
             if len(panel.get_lines()) == 1:
                 panel.text(0.5, 0.5, "no curve", transform=panel.transAxes, ha="center", va="center", color=style.GRAY)
             panel.margins(x=0.01)
-            if row == 0:
-                panel.set_title(sources[source])
-            if row == len(down) - 1:
-                panel.set_xlabel("labels")
-        axes[row, 0].set_ylabel(f"accuracy (%)\n{rows[name]}", fontsize=style.SMALL_PT)
+        row[0].set_ylabel(f"accuracy (%)\n{rows[name]}", fontsize=style.SMALL_PT)
+    for column, source in enumerate(columns):
+        axes[0, column].set_title(sources[source])
+        axes[-1, column].set_xlabel("labels")
     handles = {line.get_label(): line for panel in axes.flat for line in panel.get_lines()}
     legend_below(figure, [handles[title] for title in ordered], ordered)
     seeds = {count for key in shown for count in curves[key]["seeds"]}
@@ -112,9 +111,8 @@ def mean_curves(curve_files: Paths, held_out: Collection[str] | None = None) -> 
     for path in curve_files:
         source, strategy, seed = source_method_seed(path)
         for (setting, concept), curve in read_curves(path).items():
-            if held_out is not None and concept not in held_out:
-                continue
-            parts.setdefault((source, strategy, setting), []).append(curve[["labels", "accuracy"]].assign(seed=seed))
+            if held_out is None or concept in held_out:
+                parts.setdefault((source, strategy, setting), []).append(curve.assign(seed=seed))
     means = {}
     for key, curves in parts.items():
         by_seed = pd.concat(curves).groupby(["labels", "seed"])["accuracy"].mean()
@@ -136,8 +134,8 @@ Clusters = Mapping[tuple[str, int], int]  # (source, seed) -> number of families
 def families(files: Paths) -> Clusters:
     """Number of families of the test samples in files named ``…/{source}/seed{seed}.npz``."""
     counts = {}
-    for path in map(Path, files):
-        axes = path.parent.name, seed_of_file(path)
+    for path in files:
+        axes = Path(path).parent.name, seed_of_file(path)
         registrations = Registrations.load(path, axes)
         counts[axes] = len(np.unique(registrations.cluster[registrations.rows("test")]))
     return counts
@@ -161,10 +159,8 @@ def label_cells(test: int, clusters: Clusters) -> Callable[[Frame, Show], Cell |
         metric, chosen = column.where["metric"], where(rows, column.where)
         values_R = column.factor * chosen.groupby("seed")["value"].mean()
         if clusters and metric in OVER_TEST_SAMPLES:
-            counted = sum(
-                clusters[source, int(seed)] for source in chosen["source"].unique() for seed in values_R.index
-            )
-            return cautious_cell(values_R, test * len(values_R), counted)
+            drawn = product(chosen["source"].unique(), map(int, values_R.index))
+            return cautious_cell(values_R, test * len(values_R), sum(clusters[each] for each in drawn))
         done = where(rows, {**column.where, "metric": CENSORED_BY.get(metric)})["value"]
         return cell_of_repeats(values_R, test * len(values_R), at_least=bool((done < 1).any()))
 

@@ -14,15 +14,11 @@ TRAINED = "trained"  # kind of differences: from the best explainer that is
 JUDGED = "reenact"
 
 
-def trained(name: str) -> bool:
-    """Whether an explainer learns and reads no re-enactment: a rival of what needs no training."""
-    entry = explainers(CAUSES).get(name)
-    return entry is not None and name not in WITHOUT_TRAINING and "reenactment" not in entry.sees
-
-
-def trained_rivals(name: str, names: Collection[str]) -> Collection[str]:
-    """Return the explainers from the best of which a difference of this kind is; the ceiling is no rival."""
-    return () if name == CEILING else [other for other in names if trained(other)]
+def trained_rivals(name: str, names: Collection[str]) -> list[str]:
+    """Rivals of what needs no training, and of all but the ceiling: who learns and reads no re-enactment."""
+    entries = explainers(CAUSES)
+    learned = [other for other in names if other in entries and other not in WITHOUT_TRAINING]
+    return [other for other in learned if name != CEILING and "reenactment" not in entries[other].sees]
 
 
 def lead(intervals: Frame, titles: Mapping[str, str]) -> str:
@@ -35,14 +31,14 @@ def lead(intervals: Frame, titles: Mapping[str, str]) -> str:
         return ""
     nominal, failed = rows.loc[""].loc[["false_alarm_rate", "dominant_accuracy"], "samples"]
     row, fewest = rows.loc[(TRAINED, "balanced_accuracy")], int(min(nominal, failed // len(CONCEPTS)))
-    title, other = (titles[row[name]] for name in ("method", "other"))
-    value, low, high = (100 * row[name] for name in ("value", "low", "high"))
-    best = f"{other}, the best explainer that is trained and reads no re-enactment"
-    least, most = sorted((abs(low), abs(high)))
-    points = f"{abs(value):.1f} points of balanced accuracy ({least:.1f} to {most:.1f})"
     if fewest < FEWEST_FAILURES or row["clusters"] < FEWEST_CLUSTERS:
         counted = f"{fewest} samples of a kind and {row['clusters']:.0f} families"
         return f"Too little to conclude who leads: {counted} (it takes {FEWEST_FAILURES} and {FEWEST_CLUSTERS})."
+    title, other = (titles[row[name]] for name in ("method", "other"))
+    best = f"{other}, the best explainer that is trained and reads no re-enactment"
+    value, low, high = 100 * row[["value", "low", "high"]].astype(float)
+    least, most = sorted((abs(low), abs(high)))
+    points = f"{abs(value):.1f} points of balanced accuracy ({least:.1f} to {most:.1f})"
     if high < 0:
         return f"{best}, leads {title} by {points}."
     if low > 0:

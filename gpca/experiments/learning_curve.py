@@ -25,10 +25,7 @@ def check(config: dict, _left_out: LeftOut) -> None:
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
     settings = read_settings(CurveSettings, config[NAME])
-    return {
-        "curve_seed": list(config["seeds"])[: settings.seeds],
-        "chunk": list(range(len(settings.chunks()))),
-    }
+    return {"curve_seed": list(config["seeds"])[: settings.seeds], "chunk": list(range(len(settings.chunks())))}
 
 
 EXPERIMENT = Experiment(name=NAME, sections={NAME: CurveSettings}, names=names, check=check)
@@ -97,13 +94,12 @@ def learning_curve(run: Run, curves):
     lines = {"trees": ("Extremely randomized trees", BLUE), "gpca": ("GP-CA's classifier", ORANGE)}
     rows = {"balanced_accuracy": "balanced accuracy (%)", "regret": "regret (%)"}
     present = set(curves["source"])
-    shown = {name: title for name, title in run.source_titles.items() if name in present}
+    shown = [name for name in run.sources if name in present]
     page, axes = panels(len(rows), len(shown), 0.6 + 1.5 * len(rows), COLUMN_WIDTH_IN, sharex=True, sharey="row")
     ticks = sorted(curves.loc[curves["learner"] != CEILING, "samples"].unique())
-    for column, (source, title_of_source) in enumerate(shown.items()):
+    for column, source in enumerate(shown):
         curve = curves[curves["source"] == source]
-        for row, (metric, label) in enumerate(rows.items()):
-            panel = axes[row, column]
+        for panel, metric in zip(axes[:, column], rows, strict=True):
             for name, (title, color) in lines.items():
                 by_size = 100 * curve[curve["learner"] == name].groupby("samples")[metric].agg(["min", "mean", "max"])
                 panel.plot(by_size.index, by_size["mean"], "o-", color=color, markersize=3, label=title)
@@ -116,9 +112,9 @@ def learning_curve(run: Run, curves):
             panel.set_xscale("log")
             panel.set_xticks(ticks, [f"{tick:g}" for tick in ticks], rotation=45)
             panel.xaxis.set_minor_locator(NullLocator())
-            if column == 0:
-                panel.set_ylabel(label)
-        axes[0, column].set_title(in_lines(title_of_source))
+        axes[0, column].set_title(in_lines(run.source_titles[source]))
         axes[-1, column].set_xlabel("training samples")
+    for panel, label in zip(axes[:, 0], rows.values(), strict=True):
+        panel.set_ylabel(label)
     legend_below(page, axes[0, 0].get_lines(), columns=1)
     return page
