@@ -70,8 +70,7 @@ def reenactment_settings(config: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def measurement_settings(config: Mapping[str, Any], scan_set: str) -> dict[str, Any]:
-    scans = config["scans"]
-    first = scans["global_start"]
+    scans, first = config["scans"], config["scans"]["global_start"]
     return {
         "samples": fields_of(config["scan_causes"], ScanSamples),
         "entry": scans["datasets"][scan_set],
@@ -158,8 +157,7 @@ SHARES = {  # of the failed by each cause -> where it stands, and whether a pair
     "share_weighted": ("end", True),
     "share_one_sided": ("dominant_one_sided", True),
 }
-SAMPLE_COLUMNS = ("sample", "cluster", "overlap", "start", "times", "missed")
-WEIGHED = ("stands_for", "dominant_one_sided")
+SAMPLE_COLUMNS = ("sample", "cluster", "overlap", "start", "times", "missed", "stands_for", "dominant_one_sided")
 COLUMNS = (
     *("source", "condition", "stratum", "learned", "method", "metric", "samples", "clusters", "seeds"),
     *("value", "low", "high", "gate", "difference", "difference_low", "difference_high"),
@@ -201,32 +199,28 @@ def collect(run: Run, causes_files: Paths, sample_files: Paths, prediction_files
     conditions |= {f"{NATURAL}_{kind}": (times <= 0) & (start == kind) for kind in KINDS}
     conditions |= {f"{ADDED}_{each:g}": times == each for each in sorted(set(times)) if each}
     rows: list[tuple] = []
-    for source in [POOLED, *sources] if len(sources) > 1 else sources:
-        for condition, rows_N in conditions.items():
-            mask_N = rows_N & ((seen["scans"] == source).to_numpy() | (source == POOLED))
-            for stratum in (EVERY, *sorted(set(seen["stratum"]))):
-                chosen = seen[mask_N & ((seen["stratum"] == stratum).to_numpy() | (stratum == EVERY))]
-                if len(chosen):
-                    counts = count_ends(chosen, ("pair", "cluster"), "registrations")
-                    place = source, condition, stratum, SCANS, TRUTH
-                    sizes = (len(chosen), counts["clusters"], chosen["seed"].nunique())
-                    nothing = (np.nan, np.nan, *NO_LEAD)
-                    rows += [(*place, f"count_{kind}", *sizes, float(counts[kind]), *nothing) for kind in COUNTED]
-            if condition == f"{NATURAL}_{GLOBAL}" and source != POOLED:
-                rows += _shares((source, condition, EVERY, SCANS, FAILED), seen[mask_N & seen["end"].isin(CONCEPTS)])
-            if condition in (NATURAL, ADDED) and mask_N.any():
-                parts = {key: every.subset(mask_N) for key, every in judged.items()}
-                rows += _measures((source, condition, EVERY), parts, seen["cluster"][mask_N].to_numpy(str))
+    for source, (condition, rows_N) in product([POOLED, *sources] if len(sources) > 1 else sources, conditions.items()):
+        mask_N = rows_N & ((seen["scans"] == source).to_numpy() | (source == POOLED))
+        for stratum in (EVERY, *sorted(set(seen["stratum"]))):
+            chosen = seen[mask_N & ((seen["stratum"] == stratum).to_numpy() | (stratum == EVERY))]
+            if len(chosen):
+                counts = count_ends(chosen, ("pair", "cluster"), "registrations")
+                place = source, condition, stratum, SCANS, TRUTH
+                sizes = (len(chosen), counts["clusters"], chosen["seed"].nunique())
+                nothing = (np.nan, np.nan, *NO_LEAD)
+                rows += [(*place, f"count_{kind}", *sizes, float(counts[kind]), *nothing) for kind in COUNTED]
+        if condition == f"{NATURAL}_{GLOBAL}" and source != POOLED:
+            rows += _shares((source, condition, EVERY, SCANS, FAILED), seen[mask_N & seen["end"].isin(CONCEPTS)])
+        if condition in (NATURAL, ADDED) and mask_N.any():
+            parts = {key: every.subset(mask_N) for key, every in judged.items()}
+            rows += _measures((source, condition, EVERY), parts, seen["cluster"][mask_N].to_numpy(str))
     collected = pd.DataFrame(rows, columns=list(COLUMNS))
-    leads, bounds = collected[collected["gate"] != ""], ["difference_low", "difference_high"]
-    keys = ["source", "condition", "stratum", "metric"]
-    measured = collected.groupby(keys)
-    reach = (measured["high"].max() - measured["low"].min()).dropna().to_dict()
-    for key, of in leads.groupby(keys, sort=False):
-        value_M, low_M, high_M, clusters_M = (of[name].to_numpy(float) for name in ("difference", *bounds, "clusters"))
-        collected.loc[of.index, bounds] = np.column_stack(
-            corrected(value_M, low_M, high_M, clusters_M, reach=reach.get(key, np.inf))
-        )
+    bounds = ["difference_low", "difference_high"]
+    for _, of in collected.groupby(["source", "condition", "stratum", "metric"]):
+        reach, led = of["high"].max() - of["low"].min(), of[of["gate"] != ""]
+        columns_4_M = led[["difference", *bounds, "clusters"]].to_numpy(float).T
+        widened = corrected(*columns_4_M, reach=np.inf if np.isnan(reach) else reach)
+        collected.loc[led.index, bounds] = np.column_stack(widened)
     return collected
 
 
@@ -248,17 +242,15 @@ def _read(causes_files, sample_files, prediction_files) -> tuple[Frame, dict[tup
     """A row for each registration, and the answers of each explainer, by where it learned and its name."""
     import pandas as pd
 
-    predicted = {
-        seed_of_file(path): read_predictions(path, labels=("scans", "learned", "explainer"))
-        for path in prediction_files
-    }
+    labels = "scans", "learned", "explainer"
+    predicted = {seed_of_file(path): read_predictions(path, labels=labels) for path in prediction_files}
     seen: list[Frame] = []
     judged: dict[tuple[str, str], list[answers.Judged]] = {}
     for causes_file, sample_file in zip(causes_files, sample_files, strict=True):
         source, seed = Path(causes_file).parent.name, seed_of_file(causes_file)
         causes = Causes.load(causes_file, (source, seed))
         same = causes.registrations.arrays, "causes or the predictions", ("sample",)
-        samples = read_csv(sample_file, (*SAMPLE_COLUMNS, *WEIGHED), others=ANY)[[*SAMPLE_COLUMNS, *WEIGHED]]
+        samples = read_csv(sample_file, SAMPLE_COLUMNS, others=ANY)[[*SAMPLE_COLUMNS]]
         require_same_samples(sample_file, samples, *same)
         for key, rows in predicted[seed].groupby(["learned", "explainer"], sort=False) if seed in predicted else ():
             rows = rows[rows["scans"] == source]
@@ -283,18 +275,17 @@ def _measures(
     draws = Clustered.drawn(any_samples.seed, cluster_N, "scan cause intervals", *place)
     values = {key: scan_measures(samples, draws.weights) for key, samples in judged.items()}
     names = {key: "/".join(key).strip("/") for key in judged}
-    for metric, key in product(MEASURED, judged):
-        drawn = {names[other]: each[metric] for other, each in values.items() if metric in each}
-        value_B = drawn.get(names[key], np.array([np.nan]))
-        if not np.isfinite(value_B[0]):
-            continue
+    for metric in MEASURED:
+        drawn = {key: each[metric] for key, each in values.items() if metric in each and np.isfinite(each[metric][0])}
         counted = draws.subset(counted_of_scans(any_samples, metric))
         drawn_B_n = counted.weights[1:] if metric in (*answers.SHARES, CAUSES) else None
-        gates, lead = [names[other] for other in judged if other != key and is_trivial(other[1])], NO_LEAD
-        gate = best_of(drawn, gates, metric in answers.SMALLER_IS_BETTER)
-        if gate and key[1] != answers.CEILING and metric != SAMPLES:
-            lead = (gate, *interval(value_B - drawn[gate], drawn_B_n, difference=True))
-        yield (*place, *key, metric, *counted.counts[::-1], *interval(value_B, drawn_B_n), *lead)
+        by_name = {names[key]: value_B for key, value_B in drawn.items()}
+        for key, value_B in drawn.items():
+            gates, lead = [names[other] for other in drawn if other != key and is_trivial(other[1])], NO_LEAD
+            gate = best_of(by_name, gates, metric in answers.SMALLER_IS_BETTER)
+            if gate and key[1] != answers.CEILING and metric != SAMPLES:
+                lead = (gate, *interval(value_B - by_name[gate], drawn_B_n, difference=True))
+            yield (*place, *key, metric, *counted.counts[::-1], *interval(value_B, drawn_B_n), *lead)
 
 
 def is_trivial(explainer: str) -> bool:

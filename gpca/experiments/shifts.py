@@ -18,7 +18,7 @@ from gpca.encoders.registry import encoder_module
 from gpca.errors import InputError, with_key
 from gpca.evaluation.intervals import ANYTHING, GUESSES, REPEATS, Clustered
 from gpca.evaluation.measures import POOLED, compared, intervals
-from gpca.experiments.cause_tables import AGAIN, SECTION, SHOWN
+from gpca.experiments.cause_tables import AGAIN, POINTS, SECTION, SHOWN
 from gpca.experiments.diagnosis import CAUSES_FILES, FURTHER, TABLE, cause_titles
 from gpca.experiments.leads import JUDGED, TRAINED, trained_rivals
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module
@@ -56,7 +56,6 @@ def check(config: dict, _left_out: LeftOut) -> None:
 
 
 def shifts(config: Mapping[str, Any]) -> dict[str, str]:
-    """Titles of the shifts by name."""
     return {name: entry["title"] for name, entry in config[NAME]["truths"].items()}
 
 
@@ -76,10 +75,12 @@ EXPERIMENT = Experiment(
 
 
 def _settings(plan: Plan, wildcards: Wildcards) -> dict[str, Any]:
-    section = plan.config[NAME]
-    drawn = {name: section[name] for name in ("test", "candidates")}
-    shared = {"causes": plan.config["causes"], "icp": plan.config["registrations"]["icp"], "drawn": drawn}
-    return shared | {"shift": section["truths"][wildcards.shift]}
+    return {
+        "causes": plan.config["causes"],
+        "icp": plan.config["registrations"]["icp"],
+        "drawn": {name: plan.config[NAME][name] for name in ("test", "candidates")},
+        "shift": plan.config[NAME]["truths"][wildcards.shift],
+    }
 
 
 OF_SHIFT = "{shift}/{what}/{*shift_source}/seed{*shift_seed}.npz"
@@ -96,10 +97,9 @@ OBSERVE = Step(
     run="gpca.steps.shifts:observe",
     inputs={"causes": EACH["causes"]},
     outputs={"descriptors": EACH["descriptors"], "reenactments": EACH["reenactments"]},
-    settings=lambda plan, wildcards: {
-        **_settings(plan, wildcards),
-        **{name: plan.config["diagnosis"][name] for name in ("descriptors", "reenactment")},
-    },
+    settings=lambda plan, wildcards: (
+        _settings(plan, wildcards) | {name: plan.config["diagnosis"][name] for name in ("descriptors", "reenactment")}
+    ),
 )
 DIAGNOSE = Step(
     name="diagnose_shifts",
@@ -150,9 +150,11 @@ def collect(run: Run, prediction_files: Paths, causes_files: Paths, shifted_file
             truth = truths[shift, source, seed]
             require_same_samples(path, rows, truth.registrations.arrays, "causes", ("sample",))
             judged.setdefault(str(explainer), {})[shift, source, seed] = judged_by(rows, truth, seed)
-    order = list(dict.fromkeys(shift for shift, _, _ in truths))
     by_shift = {
-        name: {shift: joined(each[key] for key in sorted(each) if key[0] == shift) for shift in order}
+        name: {
+            shift: joined(each[key] for key in sorted(each) if key[0] == shift)
+            for shift in dict.fromkeys(shift for shift, _, _ in truths)
+        }
         for name, each in judged.items()
     }
     return intervals(measured(by_shift), "shifts")
@@ -189,10 +191,8 @@ def _with_mean(by_shift: dict[str, dict[str, np.ndarray]]) -> dict[str, dict[str
 SHOWN_OF_SHIFTS = {
     "standard": show("balanced_accuracy", "As learned (%)", STANDARD),
     MEAN: show("balanced_accuracy", "Mean over shifts (%)", MEAN),
-    DROP: show("balanced_accuracy", "Change (points)", DROP, limits=(-100.0, 100.0)),
-    "lead": show(
-        "balanced_accuracy", "Over trained (points)", MEAN, where={"against": TRAINED}, limits=(-100.0, 100.0)
-    ),
+    DROP: show("balanced_accuracy", "Change (points)", DROP, **POINTS),
+    "lead": show("balanced_accuracy", "Over trained (points)", MEAN, where={"against": TRAINED}, **POINTS),
     "false_alarm_rate": show("false_alarm_rate", "False alarms (%)", MEAN, least_is_best=True),
     "auroc_failed": show("auroc_failed", "AUROC", MEAN, factor=1, decimals=3, limits=(0.0, 1.0)),
 }
@@ -239,24 +239,20 @@ def knows(name: str) -> str:
     measures="shifts.csv",
 )
 def table9_shift(run: Run, measures):
-    names = list(run.config[NAME]["explainers"])
-    rows = [
-        Row([(name, explainer_entry(name, CAUSES).title), (words := knows(name), words)], {"method": name})
-        for name in names
-    ]
+    explainers, titles = cause_titles(run.config), shifts(run.config)
+    names, shown = run.config[NAME]["explainers"], ", ".join(titles.values())
+    rows = [Row([(name, explainers[name]), (knows(name),) * 2], {"method": name}) for name in names]
     rows.append(Row([(CEILING, AGAIN[CEILING]), ("truth",) * 2], {"method": CEILING}, rival=False))
     product = {PRODUCT: show("balanced_accuracy", "As a user registers (%)", PRODUCT)}
-    columns = (product if PRODUCT in shifts(run.config) else {}) | SHOWN_OF_SHIFTS
+    columns = (product if PRODUCT in titles else {}) | SHOWN_OF_SHIFTS
     sheet = Sheet("table9_shift", {"explainer": "Explainer", "knows": "Knows"}, rows, columns, measures)
-    titles = ", ".join(shifts(run.config).values())
-    verdict = reached(measures, shifts(run.config), cause_titles(run.config))
     return sheet.table(
         "Causes of failure under shifts of the truth" + run.stand_ins(),
         "metric",
         [
-            *filter(None, [verdict]),
+            *filter(None, [reached(measures, titles, explainers)]),
             "As a user registers: balanced accuracy where the observed cloud is moved. As learned: on the test samples "
-            f"of Table IX, where the model is. Mean over shifts, also of false alarms and AUROC: {titles}. Over "
+            f"of Table IX, where the model is. Mean over shifts, also of false alarms and AUROC: {shown}. Over "
             "trained: minus the best other explainer that is trained and reads no re-enactment, on the same draws.",
             "Knows: what is known of the generator of Table IX. Its samples: those that are learned from, of all "
             "sources together. Of a shift, the re-enactment is given the method and which cloud moved alone.",
@@ -278,13 +274,13 @@ def table9_shifts(run: Run, measures):
     shifted = shifts(run.config)
     first = {PRODUCT: shifted.pop(PRODUCT) + ", as in `gpca explain`"} if PRODUCT in shifted else {}
     titles = first | {STANDARD: "As learned, model moved"} | shifted | {MEAN: "Mean over shifts"}
-    names = {name: explainer_entry(name, CAUSES).title for name in run.config[NAME]["explainers"]}
-    columns: dict[str, Show] = {
-        name: Show(f"{title} (%)", where={"metric": "balanced_accuracy", "method": name, "against": ""}, interval=False)
-        for name, title in names.items()
+    names, balanced = run.config[NAME]["explainers"], {"metric": "balanced_accuracy"}
+    columns = {
+        name: Show(f"{explainer_entry(name, CAUSES).title} (%)", where=balanced | {"method": name}, interval=False)
+        for name in names
     }
-    lead = {"metric": "balanced_accuracy", "method": JUDGED, "against": TRAINED}
-    columns["lead"] = Show("Lead of the re-enactment (points)", where=lead, limits=(-100.0, 100.0))
+    lead = balanced | {"method": JUDGED, "against": TRAINED}
+    columns["lead"] = Show("Lead of the re-enactment (points)", where=lead, **POINTS)
     rows = [Row([each], {"concept": each[0]}) for each in titles.items()]
 
     def counts(row: Row, subset: Frame) -> dict[str, Cell]:
@@ -299,5 +295,5 @@ def table9_shifts(run: Run, measures):
             f"n: judged samples. In brackets: the 95 % interval of a bootstrap over families and seeds ({REPEATS} "
             f"draws), over {plural(sheet.seeds, 'seed')}. Bold: best explainer under a shift."
         ],
-        bold_across=list(names),
+        bold_across=names,
     )
