@@ -46,10 +46,6 @@ COSTS: dict[str, dict[str, Any]] = {CEILING: {"sees": WORDS["truth"], "icp_calls
 COST_NOTE = "Reads: what an explainer sees of a registration. ICP calls: runs beyond the one that it explains."
 
 
-def reads(cost: Mapping) -> tuple[str, str]:
-    return cost["sees"], cost["sees"]
-
-
 def counts_and_calls(costs: Mapping[str, Mapping]) -> Callable[[Row, Frame], dict[str, Cell]]:
     """The function that gives a row of a sheet its most samples, and the runs of ICP of its explainer."""
 

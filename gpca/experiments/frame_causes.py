@@ -107,24 +107,22 @@ def collect(run: Run, causes_files: Paths, sample_files: Paths, prediction_files
     judged = {explainer: joined(parts) for explainer, parts in samples_of.items()}
     together = pd.concat(tested, ignore_index=True)
     together["scene"] = together["dataset"] + " " + together["scene"]
-    pseudo_N, records = together["truth"] == BY_ICP, []
-    chosen = {kind: together[(together["start"] == kind) & ~pseudo_N] for kind in KINDS} | {PSEUDO: together[pseudo_N]}
-    for kind, starts in ((kind, starts) for kind, starts in chosen.items() if len(starts)):
-        source = f"{REAL_WORLD}/{kind}"
+    kind_N, records = together["start"].mask(together["truth"] == BY_ICP, PSEUDO), []
+    for kind in (*KINDS, PSEUDO):
+        starts, source = together[kind_N == kind], f"{REAL_WORLD}/{kind}"
         of_datasets = {f"{source}/{dataset}": subset for dataset, subset in starts.groupby("dataset")}
-        for name, subset in ({source: starts} | of_datasets).items():
+        for name, subset in ({source: starts} | of_datasets).items() if len(starts) else ():
             ends = count_ends(subset, ("instance", "scene", "object"), "starts")
             sizes = subset["seed"].nunique(), ends["scenes"], len(subset)
             records += [
                 (TABLE, name, TRUTH, f"count_{each}", ALL, "", "", *sizes, float(count), np.nan, np.nan)
                 for each, count in ({each: ends[each] for each in COUNTED} | failures_by_method(subset)).items()
             ]
-        if kind == PSEUDO:
+        if kind == PSEUDO or starts.empty:
             continue
-        scene_N = starts["scene"].to_numpy(str)
-        drawn_B_N = pigeonhole_weights(generator("frame cause intervals", kind), scene_N)
-        ones_N, instance_N = np.ones(len(starts)), starts["instance"].to_numpy()
-        draws = Clustered(starts["seed"].to_numpy(), scene_N, np.vstack([ones_N, drawn_B_N]), instance_N)
+        seed_N, scene_N, instance_N = (starts[name].to_numpy() for name in ("seed", "scene", "instance"))
+        drawn_B_N = pigeonhole_weights(generator("frame cause intervals", kind), scene_N.astype(str))
+        draws = Clustered(seed_N, scene_N, np.vstack([np.ones(len(starts)), drawn_B_N]), instance_N)
 
         def measured(each: Judged, weights_B_N: np.ndarray, once_N: np.ndarray = draws.once) -> dict[str, np.ndarray]:
             # The number of samples also where nothing else can be measured.
@@ -202,13 +200,12 @@ def table9_frames(run: Run, intervals):
         of = counts_in(where(intervals, source | {"method": TRUTH}))
         if kind == PSEUDO or not of:
             continue
-        failed = of["failed"]
-        is_enough, most = failed >= FEWEST_FAILURES, max(of[concept] for concept in CONCEPTS)
+        failed, most = of["failed"], max(of[concept] for concept in CONCEPTS)
+        is_enough = failed >= FEWEST_FAILURES
         start = (kind, f"{title} ({failed} failed{'' if is_enough else ', too few'})")
-        for explainer in (explainers | tables.AGAIN).items():
-            labels = [start, explainer, tables.reads(costs[explainer[0]])]
-            is_rival = explainer[0] != CEILING and is_enough
-            rows.append(Row(labels, source | {"method": explainer[0]}, rival=is_rival))
+        for name, words in (explainers | tables.AGAIN).items():
+            labels = [start, (name, words), (costs[name]["sees"],) * 2]
+            rows.append(Row(labels, source | {"method": name}, rival=is_enough and name != CEILING))
         by_cause = ", ".join(f"{of[concept]} mostly by {concept}" for concept in CONCEPTS)
         constant = f" One constant answer names {100 * most / failed:.0f} % of these." if failed else ""
         counted.append(
@@ -229,11 +226,9 @@ def table9_frames(run: Run, intervals):
         "The others as in Table IX. A re-enactment also reads the mesh, the camera and the pixels of the object.",
         tables.COST_NOTE,
     )
-    frames = title_of_frames(run.config)
+    frames, bold = title_of_frames(run.config), [key for key in MEASURED if key not in tables.NOT_COMPARED]
     caption = f"What is wrong with registrations of depth frames: {frames}; learned from simulated causes"
-    return sheet.table(
-        caption, "metric", notes, bold=[key for key in MEASURED if key not in tables.NOT_COMPARED], same=1
-    )
+    return sheet.table(caption, "metric", notes, bold=bold, same=1)
 
 
 @table(
@@ -246,12 +241,11 @@ def table9_frames(run: Run, intervals):
 def table9_frame_counts(run: Run, intervals):
     rows = []
     for start in STARTS.items():
-        stem = f"{REAL_WORLD}/{start[0]}/"
-        datasets = sorted({name.removeprefix(stem) for name in intervals["source"] if name.startswith(stem)})
-        labels = [("all", "All"), *((name, dataset_in_words(name)) for name in datasets)]
-        sources = [stem.rstrip("/"), *(f"{stem}{name}" for name in datasets)]
-        each = zip(labels, sources, strict=True)
-        rows += [Row([start, label], {"source": source, "method": TRUTH}) for label, source in each]
+        whole = f"{REAL_WORLD}/{start[0]}"
+        rows.append(Row([start, ("all", "All")], {"source": whole}))
+        for source in sorted({name for name in intervals["source"] if name.startswith(f"{whole}/")}):
+            dataset = source.removeprefix(f"{whole}/")
+            rows.append(Row([start, (dataset, dataset_in_words(dataset))], {"source": source}))
     metrics, prefix = dict.fromkeys(intervals["metric"]), f"count_{FAILED_BY}"
     methods = [metric.removeprefix(prefix) for metric in metrics if metric.startswith(prefix)]
     titles = {"starts": "Starts", "instances": "Instances", "scenes": "Scenes"} | ENDS
@@ -280,4 +274,4 @@ def sheet_of_counts(
         return {key: plain_cell(counts[key], 1, counts[whole]) for key in titles}
 
     columns = {key: Column(title, **tables.COUNTS) for key, title in titles.items()}
-    return Sheet(name, heads, rows, columns, measured, more=more)
+    return Sheet(name, heads, rows, columns, where(measured, {"method": TRUTH}), more=more)

@@ -218,8 +218,8 @@ def collect(run: Run, causes_files: Paths, sample_files: Paths, prediction_files
     bounds = ["difference_low", "difference_high"]
     for _, of in collected.groupby(["source", "condition", "stratum", "metric"]):
         reach, led = of["high"].max() - of["low"].min(), of[of["gate"] != ""]
-        columns_4_M = led[["difference", *bounds, "clusters"]].to_numpy(float).T
-        widened = corrected(*columns_4_M, reach=np.inf if np.isnan(reach) else reach)
+        value_M, low_M, high_M, clusters_M = led[["difference", *bounds, "clusters"]].to_numpy(float).T
+        widened = corrected(value_M, low_M, high_M, clusters_M, reach=np.inf if np.isnan(reach) else reach)
         collected.loc[led.index, bounds] = np.column_stack(widened)
     return collected
 

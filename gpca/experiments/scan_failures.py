@@ -1,6 +1,7 @@
 """Tables and the figure of the causes on scans: who detects failed registrations, names their causes, and counts."""
 
 from collections.abc import Mapping
+from itertools import product
 from math import isfinite, nan
 
 import numpy as np
@@ -18,14 +19,14 @@ from gpca.experiments import scan_causes as scans
 from gpca.experiments.frame_causes import ENDS, MISSED_NOTE, counts_in, sheet_of_counts
 from gpca.experiments.scan_causes import ADDED, CAUSES, EVERY, NATURAL, TRUTH
 from gpca.experiments.scans import titles_of_scans
-from gpca.explainers.interface import icp_calls
+from gpca.explainers.interface import WORDS, icp_calls
 from gpca.explainers.registry import CAUSES as CAUSE_EXPLAINERS
 from gpca.explainers.registry import explainer_entry
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reporting.figures.panels import in_lines, legend_below, panels
 from gpca.reporting.figures.style import CONCEPT_COLORS, GRAY, LIGHT_GRAY, SKY_BLUE, SMALL_PT, TEXT_WIDTH_IN
-from gpca.reporting.sheet import Column, Row, Sheet, interval_cell, plain_cell, plural, show, where
+from gpca.reporting.sheet import Column, Row, Sheet, crossed, interval_cell, plain_cell, plural, show, where
 
 MEASURED = {"measured": (scans.read_scan_causes, "scan_causes.csv")}
 LEARNED = {OBJECTS: "objects", SCANS: "other scenes", "": "–"}
@@ -65,7 +66,7 @@ def table18_scan_causes(run: Run, measured):
     reenactment = ReenactmentSettings(**plain(scans.reenactment_settings(run.config))).calls(starts)
     entries = {name: explainer_entry(name, CAUSE_EXPLAINERS) for name in run.config["scan_causes"]["explainers"]}
     calls = {name: icp_calls(entry.sees, starts, descriptors, reenactment) for name, entry in entries.items()}
-    costs = {name: {"sees": entry.sight} for name, entry in entries.items()} | tables.COSTS
+    sights = {name: entry.sight for name, entry in entries.items()} | {CEILING: WORDS["truth"]}
     explainers = {name: entry.title for name, entry in entries.items()} | tables.AGAIN
     rows, counted = [], []
     for name, title in (TOGETHER | titles_of_scans(run.config)).items():
@@ -75,15 +76,10 @@ def table18_scan_causes(run: Run, measured):
         few = "" if enough else ": too few"
         data = (name, f"{title} ({of['failed']} failed, {of[NOMINAL]} nominal{few})")
         natural = {"source": name, "condition": NATURAL, "stratum": EVERY}
-        rows += [
-            Row(
-                [data, explainer, learned, tables.reads(costs[explainer[0]])],
-                natural | {"method": explainer[0], "learned": learned[0]},
-                rival=enough and explainer[0] != CEILING,
-            )
-            for explainer in explainers.items()
-            for learned in LEARNED.items()
-        ]
+        for explainer, learned in product(explainers.items(), LEARNED.items()):
+            labels = [data, explainer, learned, (sights[explainer[0]],) * 2]
+            place = natural | {"method": explainer[0], "learned": learned[0]}
+            rows.append(Row(labels, place, rival=enough and explainer[0] != CEILING))
         by_cause = ", ".join(f"{of[concept]} by {concept}" for concept in CONCEPTS if of[concept])
         counted.append(
             f"{title}: {plural(of['registrations'], 'registration')} of {plural(of['pairs'], 'pair')} in "
@@ -134,15 +130,9 @@ def table18_scan_causes(run: Run, measured):
 def table18_scan_counts(run: Run, measured):
     added = sorted(name for name in set(measured["condition"]) if name.startswith(f"{ADDED}_"))
     conditions = STARTS | {name: f"{name.removeprefix(ADDED + '_')} times the sensor's noise added" for name in added}
-    rows = [
-        Row(
-            [data, condition, (stratum, stratum_in_words(stratum))],
-            {"source": data[0], "condition": condition[0], "stratum": stratum, "method": TRUTH},
-        )
-        for data in (TOGETHER | titles_of_scans(run.config)).items()
-        for condition in conditions.items()
-        for stratum in (EVERY, *(strata_of(measured) if condition[0] in STARTS else ()))
-    ]
+    strata = {stratum: stratum_in_words(stratum) for stratum in (EVERY, *strata_of(measured))}
+    axes = {"source": TOGETHER | titles_of_scans(run.config), "condition": conditions, "stratum": strata}
+    rows = [row for row in crossed(*axes.items()) if row.where["condition"] in STARTS or row.where["stratum"] == EVERY]
     heads = {"scans": "Scans", "start": "Start", "overlap": "Overlap"}
     titles = {"registrations": "Registrations", "pairs": "Pairs", "clusters": "Scenes"} | ENDS
     notes = (
@@ -171,15 +161,11 @@ def shares_in_words(measured, name: str, title: str) -> str:
     counted = f"{title}, from the global method's pose: {plural(count, 'failure')} in {plural(clusters, 'scene')}"
     if count < FEWEST_FAILURES or clusters < FEWEST_CLUSTERS:
         return f"{counted}: too few to conclude from."
-    cells = {kind: interval_cell(rows.loc[f"{kind}_overlap"]) for kind in SHARES_IN_WORDS}
-    return (
-        f"{counted}; by missing overlap "
-        + "; ".join(
-            f"{SHARES_IN_WORDS[kind]} {cell.mean:.0f} % ({cell.bounds[0]:.0f} to {cell.bounds[1]:.0f})"
-            for kind, cell in cells.items()
-        )
-        + "."
-    )
+    shares = []
+    for kind, words in SHARES_IN_WORDS.items():
+        share, low, high = 100 * rows.loc[f"{kind}_overlap", ["value", "low", "high"]]
+        shares.append(f"{words} {share:.0f} % ({low:.0f} to {high:.0f})")
+    return f"{counted}; by missing overlap {'; '.join(shares)}."
 
 
 @figure(
@@ -192,12 +178,7 @@ def scan_failures(run: Run, measured):
     from matplotlib.patches import Patch
 
     titles, strata = titles_of_scans(run.config), strata_of(measured)
-    counted = {
-        (name, condition, stratum): counts_of(measured, name, condition, stratum)
-        for name in titles
-        for condition in PANELS
-        for stratum in (EVERY, *strata)
-    }
+    counted = {key: counts_of(measured, *key) for key in product(titles, PANELS, (EVERY, *strata))}
     lines = [name for name in titles if any(counted[name, condition, EVERY] for condition in PANELS)]
     columns = [condition for condition in PANELS if any(counted[name, condition, EVERY] for name in titles)]
     if not lines:
@@ -219,8 +200,7 @@ def scan_failures(run: Run, measured):
                     panel.text(left + share / 2, place, str(of[part]), **look)
                 left += share
             if of:
-                count = f"$n$ = {of['registrations']}"
-                panel.text(102, place, count, va="center", color=GRAY, fontsize=SMALL_PT)
+                panel.text(102, place, f"$n$ = {of['registrations']}", va="center", color=GRAY, fontsize=SMALL_PT)
         panel.set_yticks(range(len(strata)), [stratum_in_words(stratum) for stratum in strata])
         panel.set(xlim=(0, 122), xticks=range(0, 101, 25))  # behind the bars stands how many registrations they are of
         panel.tick_params(labelsize=SMALL_PT)
