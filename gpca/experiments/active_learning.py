@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from gpca.active_learning.acquisition import STREAMS, require_strategy, strategies, strategy_module
+from gpca.active_learning.acquisition import STREAMS, strategies, strategy_module
 from gpca.active_learning.curves import TABLE, collect_curves
 from gpca.active_learning.settings import LOOK_EVERY, ActiveLearningSettings, RareSettings, StreamSettings, rare_setting
 from gpca.declarations import Experiment, Figure, Frame, LeftOut, Names, Paths, Plan, Run, Step, figure, numbers, table
@@ -21,7 +21,7 @@ from gpca.experiments.label_curves import (
     quantity,
 )
 from gpca.pairs.perturbation import Concept
-from gpca.reporting.sheet import Row, Sheet, Show, Table, crossed, plural
+from gpca.reporting.sheet import Sheet, Show, Table, crossed, plural
 from gpca.reporting.tables.builder import cautious_over
 from gpca.settings import Distinct, PositiveShare
 
@@ -133,56 +133,60 @@ CURVES = {"curve_files": "active_learning/{source}/{pool_strategy}/seed{seed}.cs
 )
 def table3_active_learning(run: Run, metrics: Frame, clusters: Clusters) -> Table:
     learning = run.config["active_learning"]
-    shares = learning["rare"]["shares"]
-    settings = {rare_setting(share): f"all concepts; {100 * share:g} % of the pool new" for share in shares} | SETTINGS
-    chosen = {"bald_kmeans": "BALD + k-means", "bald": "BALD", "random": "random"}
+    rare, gpc, few = learning["rare"], learning["rare"]["gpc"], learning["rare"].get("beside_seeds")
+    settings = {rare_setting(share): f"all concepts; {100 * share:g} % of the pool new" for share in rare["shares"]}
     labels = {
-        f"labels_{name}": quantity("labels_to_target", f"Labels, {words}", name, **COUNT)
-        for name, words in chosen.items()
+        "labels_bald_kmeans": quantity("labels_to_target", "Labels, BALD + k-means", "bald_kmeans", **COUNT),
+        "labels_bald": quantity("labels_to_target", "Labels, BALD", "bald", **COUNT),
+        "labels_random": quantity("labels_to_target", "Labels, random", "random", **COUNT),
     }
     columns = labels | {
         "accuracy_bald_kmeans": quantity("final_accuracy", "Acc. BALD (%)", "bald_kmeans"),
         "accuracy_random": quantity("final_accuracy", "Acc. random (%)", "random"),
         "epochs_bald_kmeans": quantity("epochs_at_target", "Epochs", "bald_kmeans", **COUNT),
     }
-    rows = crossed(("source", run.source_titles), ("setting", settings))
-    inputs = metrics[metrics["concept"] == PAPERS_HELD_OUT], clusters
+    beside = f" Shares but the first: over at most the first {plural(few, 'seed')}." if few else ""
     notes = [
-        _rare_note(learning),
+        "Where so many percent of the pool are new (5 % are compared with the paper), the paper's classifier "
+        f"({gpc['kernel']}, rate {gpc['learning_rate']:g}, {gpc['iterations']} passes) is fitted anew in each round "
+        f"(docs/comparison.md): of {rare['batch']} labels, of {rare['late_batch']} from {rare['least']} on, at most "
+        f"{rare['labels']}. Epochs are counted in steps of {LOOK_EVERY}.{beside}",
         f"Other rows: {_protocol(run)} Retraining moves the posterior alone, in at most "
         f"{learning['iterations']} passes over the labels. Epochs: passes that reached the target. Acc.: after all "
         "labels.",
     ]
     caption = f"Labels until a GPC that knew noise and pose reaches {learning['target']:.0%} on all concepts"
-    heads = "source", "setting"
-    return _table(run, "table3_active_learning", heads, rows, columns, inputs, caption, notes, bold_across=labels)
+    axes = {"source": run.source_titles, "setting": settings | SETTINGS}
+    metrics = metrics[metrics["concept"] == PAPERS_HELD_OUT]
+    return _table(run, "table3_active_learning", axes, columns, metrics, clusters, caption, notes, bold_across=labels)
 
 
 FINAL = {
     "final_accuracy": quantity("final_accuracy", "Accuracy (%)"),
     "final_accuracy_new": quantity("final_accuracy_new", "New (%)"),
 }
-HEADS = {"source": "Dataset", "setting": "Encoder saw", "strategy": "Strategy"}
+HEADS = {"source": ("source", "Dataset"), "setting": ("setting", "Encoder saw"), "method": ("strategy", "Strategy")}
 
 
 def _table(
     run: Run,
     name: str,
-    heads: Iterable[str],
-    rows: list[Row],
+    axes: Mapping[str, Mapping[str, str]],
     columns: Mapping[str, Show],
-    inputs: tuple[Frame, Clusters],
+    metrics: Frame,
+    clusters: Clusters,
     caption: str,
     notes: Iterable[str],
     **compared: Any,
 ) -> Table:
-    metrics, clusters = inputs
+    """Table with a row for every combination of the titles of the axes; an oracle competes with none."""
+    test, oracles = run.config["registrations"]["test"], [key for key, each in strategies().items() if each.oracle]
+    rows = [replace(row, rival=row.where.get("method") not in oracles) for row in crossed(*axes.items())]
     metrics = metrics.assign(setting=metrics["table"].str.removeprefix(TABLE))
-    cell = label_cells(run.config["registrations"]["test"], clusters)
-    sheet = Sheet(name, {head: HEADS[head] for head in heads}, rows, columns, metrics, cell=cell)
-    over = f"{cautious_over(sheet.seeds, run.config['registrations']['test'])}."
-    caption += run.stand_ins()
-    return sheet.table(caption, "quantity", (over, *notes), keep_empty=True, **compared)
+    heads = dict(HEADS[axis] for axis in axes)
+    sheet = Sheet(name, heads, rows, columns, metrics, cell=label_cells(test, clusters))
+    notes = (f"{cautious_over(sheet.seeds, test)}.", *notes)
+    return sheet.table(caption + run.stand_ins(), "quantity", notes, keep_empty=True, **compared)
 
 
 @figure(
@@ -209,11 +213,11 @@ def active_learning_overlap(run: Run, curve_files: Paths) -> Figure:
     return _draw(run, curve_files, OVERLAP_ROWS, (PAPERS_HELD_OUT,))
 
 
-def _draw(run: Run, files: Paths, rows: Mapping[str, str], held_out: Collection[str] | None = None):
-    learning = run.config["active_learning"]
+def _draw(run: Run, files: Paths, rows: Mapping[str, str], held_out: Collection[str] | None = None) -> Figure:
+    lines, target = titles(run.config["active_learning"]["strategies"]), run.config["active_learning"]["target"]
     by_strategy = mean_curves(files, held_out).items()
     curves = {(source, setting, strategy): curve for (source, strategy, setting), curve in by_strategy}
-    return draw_curves(curves, run.source_titles, rows, titles(learning["strategies"]), STYLES, learning["target"])
+    return draw_curves(curves, run.source_titles, rows, lines, STYLES, target)
 
 
 @table(
@@ -234,11 +238,6 @@ def table3_extended(run: Run, metrics: Frame, clusters: Clusters) -> Table:
         "area_under_curve": quantity("area_under_curve", "Area (%)"),
         "area_gain": quantity("area_gain", "Gain (%)", limits=(-100, 100)),
     }
-    pool = {name: title for name, title in titles(learning["strategies"]).items() if name not in STREAMS}
-    rows = [
-        replace(row, rival=not require_strategy(row.where["method"]).oracle)
-        for row in crossed(("source", run.source_titles), ("setting", SETTINGS), ("method", pool))
-    ]
     notes = [
         _protocol(run),
         "Labels: until the target, by the concept held out. Accuracy: after all labels; New: that on the concept "
@@ -246,8 +245,10 @@ def table3_extended(run: Run, metrics: Frame, clusters: Clusters) -> Table:
         "concepts held out.",
     ]
     caption = f"Active learning of a held-out concept by every strategy, to {learning['target']:.0%}"
-    bold, inputs = [key for key in columns if key != "reached"], (metrics, clusters)
-    return _table(run, "table3_extended", HEADS, rows, columns, inputs, caption, notes, bold=bold, same=2)
+    pool = titles(name for name in learning["strategies"] if name not in STREAMS)
+    axes = {"source": run.source_titles, "setting": SETTINGS, "method": pool}
+    bold = [key for key in columns if key != "reached"]
+    return _table(run, "table3_extended", axes, columns, metrics, clusters, caption, notes, bold=bold, same=2)
 
 
 @table(
@@ -267,9 +268,6 @@ def table3_stream(run: Run, metrics: Frame, clusters: Clusters) -> Table:
         "running_accuracy": quantity("running_accuracy", "Running (%)"),
         **FINAL,
     }
-    streams = {name: title for name, title in titles(learning["strategies"]).items() if name in STREAMS}
-    rows = crossed(("source", run.source_titles), ("method", streams))
-    heads, inputs = ("source", "strategy"), (metrics[metrics["table"] == f"{TABLE}pretrained"], clusters)
     notes = [
         f"{stream['arrivals']} samples, the first {stream['quiet']} of the two known concepts, of the others a third "
         f"new; a label may be requested for {stream['budget']:.0%} of them. Delay: arrivals from the first new sample "
@@ -277,9 +275,10 @@ def table3_stream(run: Run, metrics: Frame, clusters: Clusters) -> Table:
         "over the last arrivals, each judged before its label is known. All but Delay: means over the concepts held "
         "out."
     ]
+    axes = {"source": run.source_titles, "method": titles(name for name in learning["strategies"] if name in STREAMS)}
+    metrics, caption = metrics[metrics["table"] == f"{TABLE}pretrained"], "A new concept in a stream of registrations"
     bold = [key for key in columns if "labels" not in key]
-    caption = "A new concept in a stream of registrations"
-    return _table(run, "table3_stream", heads, rows, columns, inputs, caption, notes, bold=bold, same=1)
+    return _table(run, "table3_stream", axes, columns, metrics, clusters, caption, notes, bold=bold, same=1)
 
 
 def _protocol(run: Run) -> str:
@@ -289,16 +288,4 @@ def _protocol(run: Run) -> str:
         f"{train - learning['initial']} training samples, with all of the new concept, a third of {train}. "
         f"{learning['batch']} labels a round, {learning['labels']} in all; '>': some runs did not reach the target "
         "and count with all labels."
-    )
-
-
-def _rare_note(learning: Mapping) -> str:
-    rare = learning["rare"]
-    gpc, few = rare["gpc"], rare.get("beside_seeds")
-    beside = f" Shares but the first: over at most the first {plural(few, 'seed')}." if few else ""
-    return (
-        "Where so many percent of the pool are new (5 % are compared with the paper), the paper's classifier "
-        f"({gpc['kernel']}, rate {gpc['learning_rate']:g}, {gpc['iterations']} passes) is fitted anew in each round "
-        f"(docs/comparison.md): of {rare['batch']} labels, of {rare['late_batch']} from {rare['least']} on, at most "
-        f"{rare['labels']}. Epochs are counted in steps of {LOOK_EVERY}.{beside}"
     )

@@ -1,6 +1,6 @@
 """Figures of single failures: with the eight counterfactuals and all scores, and as an observer re-enacts them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from textwrap import fill
 
@@ -10,7 +10,7 @@ from gpca.attribution.predictions import read_predictions
 from gpca.causes.candidate import replay
 from gpca.causes.dataset import LABELS, Causes
 from gpca.causes.settings import CauseSettings
-from gpca.causes.truth import ALL, BY_SIZE, FAILED, SUBSETS, shapley_values
+from gpca.causes.truth import ALL, BY_SIZE, FAILED, NONE, SUBSETS, shapley_values
 from gpca.declarations import Figure, Paths, Run, figure
 from gpca.errors import InputError
 from gpca.evaluation.measures import source_method_seed
@@ -51,25 +51,25 @@ GAP = 0.5  # of a row, between the measured shares and the scores, which are non
     predictions_csv="diagnoses/{shown_source}/{cause_explainer}/seed{first_seed}.csv",
 )
 def causes_example(run: Run, objects_npz: Path, causes_npz: Path, predictions_csv: Paths) -> Figure:
-    truth, titles = _truth_of(run), cause_titles(run.config)
+    titles = cause_titles(run.config)
     explainers = {name: titles[name] for name in (*COMPARED, "rule") if name in titles} or titles
-    causes = Causes.load(causes_npz)
+    causes, objects = Causes.load(causes_npz), ObjectClouds.load(objects_npz)
     row = usual_failure(causes, causes_npz, is_clear(causes))
-    source, objects = run.config["figures"]["source"], ObjectClouds.load(objects_npz)
-    _, observed_8 = replay(objects, causes, row, source, seed_of_file(causes_npz), truth)
-    names, scores_R_4, verdicts = _scores(causes, row, predictions_csv, explainers)
-    below_in = 0.35 + ROW_IN * max(len(names) + GAP, 5)
+    source, seed = run.config["figures"]["source"], seed_of_file(causes_npz)
+    _, observed_8 = replay(objects, causes, row, source, seed, _truth_of(run))
+    error_8, phi_3 = causes.truth.error[row], causes.truth.phi[row]
+    shares_3 = np.maximum(phi_3, 0) / max(np.maximum(phi_3, 0).sum(), 1e-9)
+    answers = {TRUTH: (np.array([0.0, *shares_3]), "")} | _answers(causes, row, predictions_csv, explainers)
+    below_in = 0.35 + ROW_IN * max(len(answers) + GAP, 5)
     drawing = use_style().figure(figsize=(TEXT_WIDTH_IN, HEAD_IN + SOLID_IN + below_in), layout="constrained")
     above, below = drawing.subfigures(2, 1, height_ratios=(SOLID_IN + HEAD_IN / 2, below_in + HEAD_IN / 2))
-    error_8 = causes.truth.error[row]
-    most = int(np.argmax(causes.truth.phi[row]))
-    kept = SUBSETS.index(tuple(cause for cause in range(len(CONCEPTS)) if cause != most))
-    stages = {"with all three causes": ALL, f"without {CONCEPTS[most]}": kept, "without any": SUBSETS.index(())}
+    most = int(np.argmax(phi_3))
+    stages = {"with all three causes": ALL, f"without {CONCEPTS[most]}": ALL - 2**most, "without any": NONE}
     clouds = {f"{words}: {100 * error_8[subset]:.1f} %": observed_8[subset] for words, subset in stages.items()}
     _draw_over_solid(above.subplots(1, len(clouds)), objects, causes, row, clouds, size=2.5)
     left, right = below.subfigures(1, 2, width_ratios=(0.42, 0.58))
-    _draw_waterfall(left.subplots(), error_8[SUBSETS.index(())], causes.truth.phi[row])
-    _draw_scores(right.subplots(), names, scores_R_4, verdicts)
+    _draw_waterfall(left.subplots(), error_8[NONE], phi_3)
+    _draw_scores(right.subplots(), answers)
     error = f"{100 * causes.error_shown[row]:.1f} %"
     write_title(drawing, f"{_shown(run, causes, row)}. The registration shown to the explainers is off by {error}")
     return drawing
@@ -101,31 +101,26 @@ IN_BRIEF = {"reenact": "re-enactment", "gpca": "GP-CA", "rule": "rule"}  # expla
 def failures(run: Run, objects_files: Paths, causes_files: Paths, predictions_csv: Paths) -> Figure:
     titles = cause_titles(run.config)
     explainers = {name: words for name, words in IN_BRIEF.items() if name in titles} or dict(list(titles.items())[:3])
-    objects_npz = {Path(path).stem: path for path in objects_files}
-    causes_npz = {Path(path).parent.name: path for path in causes_files}
-    size = (TEXT_WIDTH_IN, HEAD_IN + GALLERY_IN * len(causes_npz))
+    size = (TEXT_WIDTH_IN, HEAD_IN + GALLERY_IN * len(run.sources))
     drawing = use_style().figure(figsize=size, layout="constrained")
-    parts = drawing.subfigures(len(causes_npz), 1, squeeze=False)[:, 0]
-    for source, part in zip(causes_npz, parts, strict=True):
+    parts = drawing.subfigures(len(run.sources), 1, squeeze=False)[:, 0]
+    for part, source, *files in zip(parts, run.sources, objects_files, causes_files, strict=True):
         part.supylabel(run.source_titles[source])
-        panels = part.subplots(1, len(CONCEPTS))
-        causes, objects = Causes.load(causes_npz[source]), ObjectClouds.load(objects_npz[source])
-        files = [path for path in predictions_csv if Path(path).parents[1].name == source]
+        objects, causes = ObjectClouds.load(files[0]), Causes.load(files[1])
+        predictions = [path for path in predictions_csv if Path(path).parents[1].name == source]
         failed_S = (causes.registrations.split == "test") & (causes.truth.state == FAILED)
-        for concept, panel in zip(CONCEPTS, panels, strict=True):
+        for concept, panel in zip(CONCEPTS, part.subplots(1, len(CONCEPTS)), strict=True):
             rows = np.flatnonzero(failed_S & (causes.truth.dominant == concept))
             panel.set_axis_off()
             if not len(rows):
                 write_below(panel, f"no failure by {concept}", fontsize=SMALL_PT)
                 continue
-            row = int(rows[np.argsort(causes.error_shown[rows], kind="stable")[len(rows) // 2]])
-            names, scores_R_4, verdicts = _scores(causes, row, files, explainers)
-            named = zip(names[1:], [LABELS[scores.argmax()] for scores in scores_R_4[1:]], verdicts[1:], strict=True)
-            answers: dict[str, list[str]] = {"right": [], "tie": [], "wrong": []}
-            for name, label, verdict in named:
-                answers[verdict].append(name if verdict == "right" else f"{name} ({label})")
+            row = _median(rows, causes.error_shown)
+            named_by: dict[str, list[str]] = {"right": [], "tie": [], "wrong": []}
+            for name, (scores_4, verdict) in _answers(causes, row, predictions, explainers).items():
+                named_by[verdict].append(name if verdict == "right" else f"{name} ({LABELS[scores_4.argmax()]})")
             words = [f"{concept}: {100 * causes.error_shown[row]:.0f} % off"]
-            words += [fill(f"{verdict}: {', '.join(who)}", LETTERS) for verdict, who in answers.items() if who]
+            words += [fill(f"{verdict}: {', '.join(names)}", LETTERS) for verdict, names in named_by.items() if names]
             clouds = {"\n".join(words): causes.registrations.cloud(row)}
             _draw_over_solid(np.array([panel]), objects, causes, row, clouds, size=2.0)
     write_title(drawing, "Failed registrations, and what explainers name")
@@ -151,17 +146,16 @@ def _draw_over_solid(
 
 def _draw_waterfall(panel, error: float, phi_3: np.ndarray) -> None:
     """Draw an error without causes and what each cause adds to it, its Shapley value: bars that end at the sum."""
-    order = [int(cause) for cause in np.argsort(phi_3, kind="stable")]
+    order = np.argsort(phi_3, kind="stable")
+    names = [CONCEPTS[cause] for cause in order]
     ends = 100 * np.cumsum([error, *phi_3[order]])
-    bars = [("without causes", 0.0, ends[0], style.LIGHT_GRAY)]
-    bars += [(CONCEPTS[c], ends[k], ends[k + 1] - ends[k], CONCEPT_COLORS[CONCEPTS[c]]) for k, c in enumerate(order)]
-    bars += [("all three", 0.0, ends[-1], style.LIGHT_GRAY)]
-    words, start, width, colors = zip(*bars, strict=True)
-    panel.barh(range(len(bars)), width, left=start, color=colors, height=0.7)
-    for place, (_, left, wide, _) in enumerate(bars):
-        sign = "+" if 0 < place < len(bars) - 1 and wide >= 0 else ""
+    start, width = [0.0, *ends[:-1], 0.0], [*np.diff(ends, prepend=0.0), ends[-1]]
+    colors = [style.LIGHT_GRAY, *(CONCEPT_COLORS[name] for name in names), style.LIGHT_GRAY]
+    panel.barh(range(len(width)), width, left=start, color=colors, height=0.7)
+    for place, (left, wide) in enumerate(zip(start, width, strict=True)):
+        sign = "+" if 0 < place < len(width) - 1 and wide >= 0 else ""
         panel.text(max(left, left + wide), place, f" {sign}{wide:.1f}", va="center_baseline", fontsize=SMALL_PT)
-    panel.set_yticks(range(len(bars)), words, fontsize=SMALL_PT)
+    panel.set_yticks(range(len(width)), ["without causes", *names, "all three"], fontsize=SMALL_PT)
     panel.invert_yaxis()
     panel.set_xlim(min(0.0, *start), 1.18 * max(ends))
     panel.set_xlabel("mean error over the starts (% of the diameter)", fontsize=SMALL_PT)
@@ -178,7 +172,11 @@ def usual_failure(causes: Causes, path: str | Path, asked_S: np.ndarray) -> int:
         raise InputError(path, "has no failed test sample", "raise causes.test")
     for wanted_S in (causes.truth.causes.sum(axis=1) > 1, asked_S):
         rows = rows[wanted_S[rows]] if wanted_S[rows].any() else rows
-    return int(rows[np.argsort(causes.truth.margin[rows], kind="stable")[len(rows) // 2]])
+    return _median(rows, causes.truth.margin)
+
+
+def _median(rows: np.ndarray, value_S: np.ndarray) -> int:
+    return int(rows[np.argsort(value_S[rows], kind="stable")[len(rows) // 2]])
 
 
 def is_clear(causes: Causes) -> np.ndarray:
@@ -187,48 +185,40 @@ def is_clear(causes: Causes) -> np.ndarray:
     return phi_S_3.max(axis=1) >= CLEAR * phi_S_3.sum(axis=1)
 
 
-def _scores(causes: Causes, row: int, files: Paths, explainers: Mapping[str, str]):
-    """Titles of the rows, their numbers (R, 4), and who is right: the measured shares first."""
+Answers = dict[str, tuple[np.ndarray, str]]  # title -> scores (4,) of the labels, and whether what it names is right
+
+
+def _answers(causes: Causes, row: int, files: Paths, explainers: Mapping[str, str]) -> Answers:
+    """What each explainer that names something says of a sample."""
     registrations, truth = causes.registrations, causes.truth
-    phi = np.maximum(truth.phi[row], 0)
-    tied = np.array(CONCEPTS)[truth.tied[row]]
-    answers: dict[str, tuple[list[float], str]] = {}
-    for path in files:
-        _, name, _ = source_method_seed(path)
-        rows = read_predictions(path)
+    right = {concept: "tie" for concept, tied in zip(CONCEPTS, truth.tied[row], strict=True) if tied}
+    right[truth.dominant[row]] = "right"
+    file_of = {source_method_seed(path)[1]: path for path in files}
+    answers = {}
+    for name, title in explainers.items():
+        rows = read_predictions(file_of[name])
         chosen = (rows["split"] == registrations.split[row]) & (rows["sample"] == str(registrations.sample[row]))
         prediction = rows[chosen].iloc[0]
         if not prediction["abstained"]:
-            named = prediction["concept_predicted"]
-            verdict = "right" if named == truth.dominant[row] else "tie" if named in tied else "wrong"
-            answers[name] = [prediction[f"score_{label}"] for label in LABELS], verdict
-    titles = [title for name, title in explainers.items() if name in answers]
-    shown = [answers[name] for name in explainers if name in answers]
-    scores_R_4 = np.array([[0.0, *(phi / max(phi.sum(), 1e-9))], *(scores for scores, _ in shown)], float)
-    return [TRUTH, *titles], scores_R_4, ["", *(verdict for _, verdict in shown)]
+            scores_4 = prediction[[f"score_{label}" for label in LABELS]].to_numpy(float)
+            answers[title] = scores_4, right.get(prediction["concept_predicted"], "wrong")
+    return answers
 
 
-def _draw_scores(panel, names: list[str], scores_R_4: np.ndarray, verdicts: Sequence[str]) -> None:
-    """Draw the measured shares, and with a gap below them the scores; the largest of each row is bold.
-
-    Beside each row stands whether what it names is the dominant cause, or ties with it.
-    """
-    place_R = np.arange(len(names)) + GAP * (np.arange(len(names)) > 0)
-    sides = -0.5, len(LABELS) - 0.5
-    for rows in (slice(0, 1), slice(1, None)):
-        if len(place_R[rows]):
-            extent = (*sides, place_R[rows][-1] + 0.5, place_R[rows][0] - 0.5)
-            panel.imshow(scores_R_4[rows], cmap=blues(), vmin=0, vmax=1, aspect="auto", extent=extent)
-    for place, verdict in zip(place_R, verdicts, strict=True):
-        look = {"fontsize": SMALL_PT, "weight": "normal" if verdict == "wrong" else "bold"}
-        panel.text(len(LABELS), place, verdict, ha="center", va="center_baseline", **look)
-    panel.set(xlim=(sides[0], sides[1] + 1), ylim=(place_R[-1] + 0.5, -0.5))
-    for (row, column), score in np.ndenumerate(scores_R_4):
-        look = {"fontsize": SMALL_PT, "color": color_on_blue(score)}
-        look["weight"] = "bold" if score == scores_R_4[row].max() else "normal"
-        panel.text(column, place_R[row], f"{score:.2f}", ha="center", va="center_baseline", **look)
+def _draw_scores(panel, answers: Answers) -> None:
+    """Draw the measured shares, which come first, and with a gap below them the scores; the largest of each is bold."""
+    place_R = np.arange(len(answers)) + GAP * (np.arange(len(answers)) > 0)
+    left, right = -0.5, len(LABELS) - 0.5
+    for place, (scores_4, verdict) in zip(place_R, answers.values(), strict=True):
+        extent = (left, right, place + 0.5, place - 0.5)
+        panel.imshow(scores_4[None], cmap=blues(), vmin=0, vmax=1, aspect="auto", extent=extent)
+        cells = [(f"{score:.2f}", score == scores_4.max(), color_on_blue(score)) for score in scores_4]
+        for column, (words, is_bold, color) in enumerate([*cells, (verdict, verdict != "wrong", style.BLACK)]):
+            look = {"fontsize": SMALL_PT, "color": color, "weight": "bold" if is_bold else "normal"}
+            panel.text(column, place, words, ha="center", va="center_baseline", **look)
+    panel.set(xlim=(left, right + 1), ylim=(place_R[-1] + 0.5, -0.5))
     panel.spines[:].set_visible(False)
-    panel.set_yticks(place_R, names, fontsize=SMALL_PT)
+    panel.set_yticks(place_R, answers, fontsize=SMALL_PT)
     panel.set_xticks(range(len(LABELS) + 1), [*LABELS, "answer"], fontsize=SMALL_PT)
     panel.tick_params(length=0, pad=2, labeltop=True, labelbottom=False)
 
@@ -281,7 +271,7 @@ def reenactment(run: Run, objects_npz: Path, causes_npz: Path, reenactments_npz:
     above, below = drawing.subfigures(2, 1, height_ratios=(strip_in, ERRORS_IN))
     _draw_over_solid(above.subplots(1, len(clouds)), ObjectClouds.load(objects_npz), causes, row, clouds, size=1.5)
     _draw_errors(below.subplots(), causes.truth.error[row], errors_K_8, weight_K)
-    phi_3 = shapley_values((weight_K[:, None] * errors_K_8).sum(axis=0)[None])[0]
+    phi_3 = shapley_values((weight_K @ errors_K_8)[None])[0]
     named, true = CONCEPTS[int(np.argmax(phi_3))], causes.truth.dominant[row]
     verdict = f"It names {named}" + (", as measured" if named == true else f"; measured is {true}")
     write_title(drawing, f"{_shown(run, causes, row)}. {verdict}")

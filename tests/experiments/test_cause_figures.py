@@ -46,7 +46,10 @@ def test_what_was_measured_stands_apart_from_the_scores_and_the_largest_of_a_row
 
     figure, panel = plt.subplots()
     numbers = np.array([[0.0, 0.5, 0.3, 0.2], [0.1, 0.2, 0.9, 0.8], [0.7, 0.1, 0.1, 0.1]])
-    cause_figures._draw_scores(panel, [cause_figures.TRUTH, "Multi-label", "Right"], numbers, ["", "wrong", "tie"])
+    answers = zip(
+        (cause_figures.TRUTH, "Multi-label", "Right"), zip(numbers, ("", "wrong", "tie"), strict=True), strict=True
+    )
+    cause_figures._draw_scores(panel, dict(answers))
     assert panel.get_yticks().tolist() == [0, 1 + cause_figures.GAP, 2 + cause_figures.GAP]
     bold = {text.get_text() for text in panel.texts if text.get_fontweight() == "bold"}
     assert bold == {"0.50", "0.90", "0.70", "", "tie"}
