@@ -26,6 +26,7 @@ from gpca.pairs.dataset import Registrations  # noqa: E402 (the script runs from
 from gpca.pairs.perturbation import CONCEPTS  # noqa: E402
 from gpca.uncertainty.designs import DESIGNS  # noqa: E402
 from gpca.uncertainty.outcomes import Outcomes  # noqa: E402
+from gpca.uncertainty.settings import CONDITIONS  # noqa: E402
 from gpca.uncertainty.spread import divergence  # noqa: E402
 
 FLOORS = tuple(float(f"1e-{digits}") for digits in range(9, 2, -1))
@@ -95,9 +96,7 @@ def seed_numbers(
         attribution = explainer_entry(name).make(source, seed).explain(additive.without_labels())
         numbers[name] = np.mean(attribution.predicted_N == additive.concept)  # abstained is wrong
     uncertainty_S_K = at_floor(causal, "causal", floor).attached["uncertainty"]
-    clean_S, observed_S = (
-        uncertainty_S_K[:, DESIGNS["causal"].conditions.index(name)] for name in ("clean", "observed")
-    )
+    clean_S, observed_S = (uncertainty_S_K[:, CONDITIONS["causal"].index(name)] for name in ("clean", "observed"))
     numbers |= {"clean_median": np.median(clean_S), "clean_95th": np.quantile(clean_S, CAUSAL_QUANTILE)}
     causal_S = observed_S > numbers["clean_95th"]
     shares = {f"causal_{c}": causal_S[causal.concept == c].mean() for c in CONCEPTS if c in causal.concept}

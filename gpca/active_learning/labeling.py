@@ -49,11 +49,6 @@ class Queue(Container):
         """Return the target cloud (Q, 3) of row i."""
         return self.part("target_points", i)
 
-    @property
-    def marked(self) -> dict[str, np.ndarray]:
-        """The arrays of a file, with the mark of a queue."""
-        return self.arrays | {QUEUE_MARK: np.array(1)}
-
 
 def is_queue(path: str | Path) -> bool:
     try:
@@ -86,7 +81,7 @@ def add_to_queue(path: str | Path, aligned: np.ndarray, target: np.ndarray, h_1_
             if before.h.shape[1] != one.h.shape[1]:
                 raise InputError(path, "is a queue of another model", "name another file with --queue")
             one = Queue.joined([before, one])
-        write_arrays(partial, one.marked)
+        write_arrays(partial, one.arrays | {QUEUE_MARK: np.array(1)})
     return len(one)
 
 
@@ -105,8 +100,6 @@ class LabelFile:
             self.path.open(newline="", encoding="utf-8-sig", errors="replace") as file,
         ):
             head, *rows = [*filter(None, csv.reader(file))] or [[*LABEL_COLUMNS]]
-        if missing := [column for column in LABEL_COLUMNS if column not in head]:
-            raise InputError(self.path, f"column '{missing[0]}' is missing", remedy)
         if head != [*LABEL_COLUMNS]:
             raise InputError(self.path, f"has the columns {','.join(head)[:80]}", f"give {','.join(LABEL_COLUMNS)}")
         known = {(str(number), split): (split, number) for split, number in samples}
@@ -133,8 +126,6 @@ class LabelFile:
 
 def require_name(concept: str, subject: object = "concept") -> None:
     """Raise an InputError unless the concept can name a column: lowercase letters, digits and _."""
-    if not concept:
-        raise InputError(subject, "the concept has no name", "give one, e.g. 'occlusion'")
     if not re.fullmatch(r"[a-z_][a-z0-9_]{0,39}", concept):
         fault = f"'{concept[:40]}' is not a valid concept name"
         raise InputError(subject, fault, "use at most 40 lowercase letters, digits and _")

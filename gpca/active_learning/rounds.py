@@ -18,20 +18,6 @@ from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator
 
-
-@dataclass(frozen=True)
-class Embedded:
-    """S samples: embedding (S, d), concept (S,) and split (S,), ``train`` or ``test``."""
-
-    embedding: np.ndarray
-    concept: np.ndarray
-    split: np.ndarray
-
-    def rows(self, split: str) -> np.ndarray:
-        """Return the rows of a split."""
-        return np.flatnonzero(self.split == split)
-
-
 Inputs = TypeVar("Inputs", np.ndarray, Projection)
 
 
@@ -68,7 +54,7 @@ class LabelingTask(Generic[Inputs]):
 
 
 def make_task(
-    samples: Registrations | Embedded,
+    samples: Registrations,
     held_out: str,
     settings: ActiveLearningSettings,
     *axes: object,

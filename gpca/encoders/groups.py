@@ -53,7 +53,6 @@ class GroupMLP(nn.Module):
         self.last_relu = last_relu
 
     def forward(self, points_B_N_3: torch.Tensor, x_B_N_F: torch.Tensor | None, groups: Groups) -> torch.Tensor:
-        """Return the groups' features (B, M, F_out) from the points' coordinates and features."""
         if points_B_N_3.device.type != "cpu":
             return self.plain(points_B_N_3, x_B_N_F, groups)
         batch, n_groups, _ = groups.centers_B_M_3.shape
@@ -180,7 +179,6 @@ def _numpy(x: torch.Tensor) -> np.ndarray:
 
 
 def take(x_B_N_F: torch.Tensor, index_B_M: torch.Tensor) -> torch.Tensor:
-    """Return the rows (B, M, F) of each cloud at the indices."""
     batch, n, _ = x_B_N_F.shape
     rows = index_B_M + n * torch.arange(batch, device=x_B_N_F.device).view(-1, *[1] * (index_B_M.ndim - 1))
     return x_B_N_F.reshape(batch * n, -1).index_select(0, rows.reshape(-1)).view(*index_B_M.shape, -1)

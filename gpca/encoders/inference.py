@@ -37,7 +37,6 @@ class TrainedEncoder:
 
     @classmethod
     def of(cls, module: nn.Module, settings: EncoderSettings) -> TrainedEncoder:
-        """Take the weights of a trained module of torch."""
         return cls(settings, {name: part.detach().cpu().numpy() for name, part in module.state_dict().items()})
 
     def __call__(self, clouds_B_N_3: np.ndarray, device: str | None = None) -> np.ndarray:
@@ -52,7 +51,6 @@ class TrainedEncoder:
 
     @cached_property
     def module(self) -> nn.Module:
-        """The backbone in torch, in evaluation mode."""
         import torch
 
         module = make_encoder(self.settings.backbone, self.settings.options)
@@ -130,7 +128,6 @@ def _norm_shapes(name: str, features: int) -> dict[str, tuple]:
 
 
 def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return ``a @ b`` of matrices, stacked or not."""
     with np.errstate(over="ignore", invalid="ignore"):  # as torch; a diverging training is stopped by its loss
         return np.matmul(a, b)
 

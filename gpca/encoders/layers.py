@@ -33,7 +33,6 @@ class BatchNorm(nn.BatchNorm1d):
     momentum: float
 
     def scale_and_shift(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return scale and shift (F,) of inference."""
         return scale_and_shift(*(getattr(self, part).detach().numpy() for part in NORM))
 
     @torch.no_grad()

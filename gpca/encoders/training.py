@@ -234,7 +234,6 @@ def _resume(checkpoint: Path | None, identity: str, state: dict) -> list[dict]:
 
 
 def write_tensors(path: str | Path, content: object) -> None:
-    """Write a file, complete or not at all."""
     # Given a path, torch.save writes its name into the file; here that would be the temporary one.
     with whole_file(path) as partial, partial.open("wb") as file:
         torch.save(content, file)

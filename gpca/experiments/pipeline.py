@@ -1,7 +1,7 @@
 """Figure 4: online inference (top) and one round of active learning (bottom), from the files of a run."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -81,12 +81,12 @@ def first_round(
     from sklearn.decomposition import PCA
     from sklearn.preprocessing import StandardScaler
 
-    from gpca.active_learning.rounds import Embedded, initial_gpc, make_task, pool_of
+    from gpca.active_learning.rounds import initial_gpc, make_task, pool_of
 
     samples = stages.registrations
     row_S_1 = np.arange(len(samples))[:, None]
     row_task, task = (
-        make_task(Embedded(each, samples.concept, samples.split), held_out, settings, source, seed)
+        make_task(replace(samples, attached={"embedding": each}), held_out, settings, source, seed)
         for each in (row_S_1, stages.h_S_d)
     )
     gpc = initial_gpc(task, settings, source, seed, SETTING)

@@ -8,7 +8,7 @@ import numpy as np
 from gpca.active_learning.acquisition import STREAMS, strategies
 from gpca.active_learning.curves import POOL_COLUMNS, STREAM_COLUMNS, write_curves
 from gpca.active_learning.retraining import Retraining, learn
-from gpca.active_learning.rounds import Embedded, initial_gpc, make_task, rounds
+from gpca.active_learning.rounds import initial_gpc, make_task, rounds
 from gpca.active_learning.settings import (
     ALL_LABELS,
     PAIR,
@@ -116,12 +116,12 @@ def learn_on_frames(job: Job) -> None:
             write_curves(path, curves[strategy], POOL_COLUMNS)
 
 
-def _embedded(job: Job, points: int) -> Iterator[tuple[str, Embedded]]:
+def _embedded(job: Job, points: int) -> Iterator[tuple[str, Registrations]]:
     """Name of each embedding, and the samples in it."""
     registrations = Registrations.load(job.registrations, job.axes)
 
-    def samples(h_S_d: np.ndarray) -> Embedded:
-        return Embedded(h_S_d, registrations.concept, registrations.split)
+    def samples(h_S_d: np.ndarray) -> Registrations:
+        return replace(registrations, attached={"embedding": h_S_d})
 
     of_backbones = [load_embeddings(path, registrations, {"h": ("S", "d")})["h"] for path in job.embeddings]
     yield from zip(job.backbones, map(samples, of_backbones), strict=True)

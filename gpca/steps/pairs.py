@@ -45,9 +45,9 @@ def registrations(job: Job) -> None:
 
 def uncertainty(job: Job) -> None:
     """Run the conditions of a design by Monte-Carlo ICP, seed by seed -> ``uncertainty/{source}/{design}/``."""
-    from gpca.uncertainty.designs import DESIGNS, design_rows, evaluate_design
+    from gpca.uncertainty.designs import design_rows, evaluate_design
     from gpca.uncertainty.outcomes import write_seconds
-    from gpca.uncertainty.settings import UncertaintySettings
+    from gpca.uncertainty.settings import CONDITIONS, UncertaintySettings
 
     own, icp = job.settings_and_icp()
     settings = UncertaintySettings(**fields_of(own, UncertaintySettings), icp=ICPSettings(**icp))
@@ -57,7 +57,7 @@ def uncertainty(job: Job) -> None:
             chosen = registrations.subset(design_rows(registrations, job.design, own.get("samples")))
             outcomes, *seconds = evaluate_design(job.design, chosen, job.source, seed, settings)
             outcomes.save(out, (job.source, seed))
-            outcomes.write_table(table, DESIGNS[job.design].conditions)
+            outcomes.write_table(table, CONDITIONS[job.design])
             write_seconds(timings, outcomes, *seconds)
 
 

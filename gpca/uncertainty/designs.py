@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import cache, partial
 from typing import Any
@@ -17,7 +17,7 @@ from gpca.process.progress import progress
 from gpca.seeds import generator, seed_of
 from gpca.uncertainty.interventions import MIDDLE, UNTOUCHED, UPPER, Clouds, KnobRuns, Knobs, PairDraws, RemedyRuns
 from gpca.uncertainty.outcomes import Outcomes
-from gpca.uncertainty.settings import CONDITIONS, CORNERS, LATIN, SALTELLI, Remedies, UncertaintySettings
+from gpca.uncertainty.settings import CORNERS, LATIN, SALTELLI, Remedies, UncertaintySettings
 from gpca.uncertainty.spread import Spread, divergence
 
 STEP = 0.1  # a local derivative takes this step, in the knob's range
@@ -31,10 +31,9 @@ ADDITIVE_KNOBS = (
 
 @dataclass(frozen=True)
 class Design:
-    """A list of K conditions; `evaluate` returns the outcomes of all for a pair with its starts and random numbers."""
+    """K conditions (`CONDITIONS`): `evaluate` returns the outcomes for a pair with its starts and random numbers."""
 
     evaluate: Callable[[RegisteredRow, PairDraws], list[Spread]]
-    conditions: tuple[str, ...]
     reference: int = 0  # number of the clean condition
     splits: tuple[str, ...] = ("test",)  # which rows are evaluated
     oracle: bool = False  # whether it needs to know what was perturbed
@@ -68,10 +67,9 @@ class RegisteredRow:
         return Knobs(float(self._severity["noise"]), float(spread), float(self._severity["crop"]))
 
 
-def _turned(knobs: Callable[[], Iterable[Knobs]], pair: RegisteredRow, draws: PairDraws) -> list[Spread]:
-    """Turn the knobs on top of the observed pair."""
+def _turned(design: str, pair: RegisteredRow, draws: PairDraws) -> list[Spread]:
     runs = KnobRuns(pair.observed(draws.settings.icp_points, draws.random), draws)
-    return [runs(each) for each in knobs()]
+    return [runs(knobs) for knobs in knobs_of(design)]
 
 
 def _removal(pair: RegisteredRow, draws: PairDraws) -> list[Spread]:
@@ -93,6 +91,13 @@ def _causal(pair: RegisteredRow, draws: PairDraws) -> list[Spread]:
     ]
 
 
+def knobs_of(design: str) -> Sequence[Knobs]:
+    if design == "additive":
+        return ADDITIVE_KNOBS
+    turned = np.empty((0, 3)) if design == "observed" else sample_knobs(design)
+    return UNTOUCHED, *(Knobs(*knobs) for knobs in turned)
+
+
 @cache
 def sample_knobs(kind: str) -> np.ndarray:
     """Return settings of the knobs (K, 3) up to their upper ends, through SALib, the same for every pair."""
@@ -106,23 +111,17 @@ def sample_knobs(kind: str) -> np.ndarray:
     return sobol.sample(problem, SALTELLI, calc_second_order=False, seed=seed)
 
 
-def _swept(kind: str) -> Callable[[], Iterable[Knobs]]:
-    return lambda: (UNTOUCHED, *(Knobs(*knobs) for knobs in sample_knobs(kind)))
-
-
 DESIGNS = {
     # SHAP and local sensitivity as the paper describes them: fixed knobs on top of the observed pair.
-    "additive": Design(partial(_turned, lambda: ADDITIVE_KNOBS), CONDITIONS["additive"]),
-    "latin": Design(partial(_turned, _swept("latin")), CONDITIONS["latin"]),
-    "saltelli": Design(partial(_turned, _swept("saltelli")), CONDITIONS["saltelli"]),
+    **{name: Design(partial(_turned, name)) for name in ("additive", "latin", "saltelli")},
     # The true knobs on a clean pair.
-    "oracle": Design(_oracle, CONDITIONS["oracle"], oracle=True),
+    "oracle": Design(_oracle, oracle=True),
     # Remedies applied to the observed pair; the clean run is the one with all of them.
-    "removal": Design(_removal, CONDITIONS["removal"], reference=len(CORNERS) - 1, splits=SPLITS),
+    "removal": Design(_removal, reference=len(CORNERS) - 1, splits=SPLITS),
     # The observed pair alone, for explainers that need no more: the reference is itself, so the uncertainty is none.
-    "observed": Design(partial(_turned, lambda: (UNTOUCHED,)), CONDITIONS["observed"], splits=SPLITS),
+    "observed": Design(partial(_turned, "observed"), splits=SPLITS),
     # Whether the pair is uncertain at all, beside a second clean pair.
-    "causal": Design(_causal, CONDITIONS["causal"]),
+    "causal": Design(_causal),
 }
 
 
@@ -142,7 +141,6 @@ def design_rows(registrations: Registrations, design: str, samples: int | None) 
 def draws_of(
     registrations: Registrations, row: int, source: str, seed: int, settings: UncertaintySettings
 ) -> PairDraws:
-    """Return what the runs of a registration share, in whichever design."""
     axes = (source, seed, "uncertainty", registrations.split[row], registrations.sample[row])
     xi_n_6 = generator(*axes, "starts").normal(size=(settings.starts, 6)) * settings.deviation_6()
     return PairDraws(xi_n_6, settings, generator(*axes, "clouds"))

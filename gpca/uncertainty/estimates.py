@@ -59,5 +59,4 @@ def read_estimates(path: str | Path) -> Frame:
 
 
 def read_estimate_files(files: Iterable[str | Path]) -> dict[tuple[str, str, int], Frame]:
-    """Rows of files named ``…/{source}/{estimator}/seed{seed}.csv`` by these three."""
     return {source_method_seed(path): read_estimates(path) for path in files}

@@ -1,16 +1,18 @@
 """Rounds in which the classifier is fitted to all labels: what it learns from, how labels and epochs are counted."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from gpca.active_learning import retraining as module
 from gpca.active_learning.retraining import Retraining, learn
-from gpca.active_learning.rounds import Embedded, make_task
+from gpca.active_learning.rounds import make_task
 from gpca.active_learning.settings import LOOK_EVERY, ActiveLearningSettings, RetrainingSettings
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
+from gpca.io.files import SPLITS
 from gpca.pairs.perturbation import CONCEPTS
 
 QUICK = GPCSettings(learning_rate=0.1, iterations=12, inducing=6, draws=50)
@@ -23,7 +25,9 @@ def task():
     random = np.random.default_rng(0)
     concept_S = np.repeat(CONCEPTS, 30)
     h_S_d = (3 * np.repeat(np.eye(3, 5), 30, axis=0) + random.normal(size=(90, 5))).astype(np.float32)
-    samples = Embedded(h_S_d, concept_S, np.where(np.arange(90) % 3 == 0, "test", "train"))
+    split_S = np.where(np.arange(90) % 3 == 0, "test", "train")
+    rows = {split: np.flatnonzero(split_S == split) for split in SPLITS}
+    samples = SimpleNamespace(embedding=h_S_d, concept=concept_S, rows=rows.get)
     return make_task(samples, "overlap", ActiveLearningSettings(initial=12), "tiny", 0, new_share=0.3)
 
 

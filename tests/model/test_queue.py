@@ -56,8 +56,7 @@ def test_two_that_queue_at_once_lose_nothing(explained, tmp_path):
 def test_a_queue_without_rows_is_refused(explained, tmp_path):
     path, clouds = tmp_path / "queued.npz", (explained.scene.aligned, explained.scene.target)
     add_to_queue(path, *clouds, np.zeros((1, 4)), "a to b")
-    marked = Queue.load(path).marked
-    np.savez(path, **Queue(**{name: marked[name] for name in Queue.array_fields()}).subset(np.arange(0)).marked)
+    np.savez(path, **Queue.load(path).subset(np.arange(0)).arrays)
     with pytest.raises(InputError, match="has no samples"):
         Queue.load(path)
 

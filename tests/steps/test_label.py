@@ -71,7 +71,11 @@ FAULTS = [
     (removed("answers.txt"), {}, r"answers.txt: no such file; give a text file in UTF-8 with one answer per line"),
     (untouched, {"--known": ["noise"]}, r"starts with fewer than two labeled concepts; name two with --known"),
     (untouched, {"--strategy": "best"}, r"strategy 'best': unknown; choose one of random"),
-    (written("labels.csv", "sample,split\n1,train\n"), {}, r"labels.csv: column 'concept' is missing"),
+    (
+        written("labels.csv", "sample,split\n1,train\n"),
+        {},
+        r"labels.csv: has the columns sample,split; give sample",
+    ),
     (written("labels.csv", "sample,split,concept\n99,train,pose\n"), {}, r"labels.csv, line 2: no sample '99' of"),
     (written("labels.csv", "sample,split,concept\n9,train,\n9,train,pose\n"), {}, r"line 3: 'pose' contradicts the"),
     (written("labels.csv", "sample,split,concept\n9,train,Not pose\n"), {}, r"'Not pose' is not a valid concept name"),

@@ -7,7 +7,7 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.rigid import transform
 from gpca.uncertainty import designs
 from gpca.uncertainty.interventions import MIDDLE, UNTOUCHED, UPPER, PairDraws
-from gpca.uncertainty.settings import CORNERS, LATIN, SALTELLI, UncertaintySettings
+from gpca.uncertainty.settings import CONDITIONS, CORNERS, LATIN, SALTELLI, UncertaintySettings
 
 SETTINGS = UncertaintySettings(starts=13, icp_points=60)
 XI = np.random.default_rng(0).normal(size=(13, 6)) * SETTINGS.deviation_6()
@@ -35,16 +35,16 @@ def evaluated(registrations):
 def test_the_names_of_the_corners_are_what_is_switched_on():
     knobs = ("untouched", "noise", "pose", "noise+pose", "overlap", "noise+overlap", "pose+overlap")
     knobs += ("noise+pose+overlap",)
-    assert designs.DESIGNS["oracle"].conditions == designs.DESIGNS["additive"].conditions[:8] == knobs
-    assert designs.DESIGNS["additive"].conditions[8:] == ("noise_step", "pose_step", "overlap_step")
-    assert designs.DESIGNS["removal"].conditions == (
+    assert CONDITIONS["oracle"] == CONDITIONS["additive"][:8] == knobs
+    assert CONDITIONS["additive"][8:] == ("noise_step", "pose_step", "overlap_step")
+    assert CONDITIONS["removal"] == (
         *("observed", "denoise", "restart", "denoise+restart", "trim", "denoise+trim", "restart+trim"),
         "denoise+restart+trim",
     )
-    assert designs.DESIGNS["removal"].conditions[designs.DESIGNS["removal"].reference] == "denoise+restart+trim"
-    assert designs.DESIGNS["causal"].conditions == ("reference", "clean", "observed")
-    assert len(designs.DESIGNS["latin"].conditions) == 1 + LATIN
-    assert len(designs.DESIGNS["saltelli"].conditions) == 1 + 5 * SALTELLI
+    assert CONDITIONS["removal"][designs.DESIGNS["removal"].reference] == "denoise+restart+trim"
+    assert CONDITIONS["causal"] == ("reference", "clean", "observed")
+    assert len(CONDITIONS["latin"]) == 1 + LATIN
+    assert len(CONDITIONS["saltelli"]) == 1 + 5 * SALTELLI
 
 
 def test_the_settings_of_the_knobs_are_in_the_order_of_the_names(registrations, monkeypatch):
@@ -59,7 +59,7 @@ def test_the_settings_of_the_knobs_are_in_the_order_of_the_names(registrations, 
 
     monkeypatch.setattr(designs, "KnobRuns", Recorded)
     outcomes("additive", registrations, 40)
-    for knobs, name in zip(asked[:8], designs.DESIGNS["additive"].conditions[:8], strict=True):
+    for knobs, name in zip(asked[:8], CONDITIONS["additive"][:8], strict=True):
         expected = [
             middle if concept in name.split("+") else rest
             for concept, middle, rest in zip(CONCEPTS, MIDDLE, UNTOUCHED, strict=True)

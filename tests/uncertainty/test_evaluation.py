@@ -5,7 +5,7 @@ from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.uncertainty import designs
 from gpca.uncertainty.designs import DESIGNS, design_rows, evaluate_design
-from gpca.uncertainty.settings import UncertaintySettings
+from gpca.uncertainty.settings import CONDITIONS, UncertaintySettings
 from gpca.uncertainty.spread import divergence
 
 SETTINGS = UncertaintySettings(starts=13, icp_points=60)
@@ -55,7 +55,7 @@ def test_outcomes_are_finite_and_measured_against_the_reference(registrations, d
     entry = DESIGNS[design]
     rows = design_rows(registrations, design, 3)[-3:]
     outcomes, seconds_S_K, icp_seconds_S_K = evaluate(design, registrations, rows)
-    shape = (3, len(entry.conditions))
+    shape = (3, len(CONDITIONS[design]))
     assert outcomes.sample.tolist() == registrations.sample[rows].tolist()
     assert outcomes.split.tolist() == registrations.split[rows].tolist()
     assert outcomes.covariance.shape == (*shape, 6, 6)

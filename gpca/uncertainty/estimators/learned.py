@@ -37,7 +37,8 @@ def learn_cello(
 
     reduce, features_E_K = _reduced(examples, components)
     features = torch.from_numpy(features_E_K)
-    variances_E_6 = np.array([_variances(example) for example in examples])
+    twists_E_n_6 = (twists_along_axes(each.twists, each.T_target_intrinsic) for each in examples)
+    variances_E_6 = np.array([twists_n_6.var(axis=0) + FLOOR for twists_n_6 in twists_E_n_6])
     variances = torch.from_numpy(variances_E_6)
     log_scale = torch.zeros(features.shape[1], dtype=torch.float64, requires_grad=True)
     optimizer = Adam([log_scale], learning_rate)
@@ -112,10 +113,6 @@ def twists_along_axes(twists_n_6: np.ndarray, T_target_intrinsic: np.ndarray) ->
     return np.linalg.solve(adjoint(T_target_intrinsic), twists_n_6.T).T
 
 
-def _variances(example: Example) -> np.ndarray:
-    return twists_along_axes(example.twists, example.T_target_intrinsic).var(axis=0) + FLOOR
-
-
 def learn_ensemble(
     examples: Sequence[Example],
     members: int = 5,
@@ -172,7 +169,6 @@ class _Ensemble:
         learning_rate: float,
         weight_decay: float,
     ) -> None:
-        """Learn from the features of each pair and the errors (n, 6) of its runs."""
         import torch
 
         from gpca.portable import Adam

@@ -24,7 +24,6 @@ estimators, estimator_entry, estimator_module = REGISTRY.entries, REGISTRY.entry
 
 
 def require_estimator_settings(name: str, settings: Mapping[str, object]) -> None:
-    """Raise an InputError unless the estimator is known and takes these settings."""
     entry = estimator_entry(name)
     require_arguments(f"estimator '{name}'", cast("Callable", entry.learn or entry.estimate), 1, settings)
 
