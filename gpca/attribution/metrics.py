@@ -56,19 +56,20 @@ def collect(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
     for path in prediction_files:
         source, method, seed = source_method_seed(path)
         test = _test_rows(path, read_predictions(path))
-        metrics = attribution_metrics(test, concepts_of(test))
-        for metric, values in metrics.items():
+        for metric, values in attribution_metrics(test, concepts_of(test)).items():
             records += [("attribution", source, method, metric, c, seed, float(v)) for c, v in values.items()]
     return tidy(records, "predictions")
 
 
 def attribution_metrics(test: pd.DataFrame, concepts: list[str]) -> dict[str, dict[str, float]]:
     """Return metric -> concept or `ALL` -> value; a concept without samples has none."""
-    judged = _judged(test)
-    counts = confusion(*judged, concepts)
+    true_S, named_S, abstained_S = (
+        test[name].to_numpy() for name in ("concept_true", "concept_predicted", "abstained")
+    )
+    counts = confusion(true_S, named_S, abstained_S, concepts)
     samples = {concept: n for concept, n in zip(concepts, counts.sum(axis=1), strict=True) if n}
     metrics = {
-        "accuracy": concept_accuracy(*judged, concepts),
+        "accuracy": concept_accuracy(true_S, named_S, abstained_S, concepts),
         "test_samples": {ALL: len(test)} | samples,
         "clusters": {ALL: test["cluster"].nunique()} | test.groupby("concept_true")["cluster"].nunique().to_dict(),
         "abstention_rate": {ALL: test["abstained"].mean()},
@@ -84,10 +85,6 @@ def _test_rows(path: str | Path, rows: pd.DataFrame) -> pd.DataFrame:
     if rows.empty:
         raise InputError(path, "has no test rows", "regenerate it")
     return rows
-
-
-def _judged(rows: pd.DataFrame) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    return tuple(rows[name].to_numpy() for name in ("concept_true", "concept_predicted", "abstained"))
 
 
 def collect_timings(timing_files: Iterable[str | Path]) -> pd.DataFrame:

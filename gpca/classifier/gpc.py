@@ -12,7 +12,6 @@ from gpca.classifier.latents import Latents, Projection, Sites, elbo, refine
 from gpca.classifier.prior import Covariance, Prior, Standardization
 from gpca.classifier.scores import summarize_marginals
 from gpca.classifier.settings import GPCSettings
-from gpca.errors import InputError
 from gpca.process.progress import progress
 from gpca.seeds import generator, seed_of
 
@@ -120,9 +119,6 @@ class GPC:
 
     def grow(self, name: str) -> None:
         """Add a class whose covariance is the geometric mean of the others', and refit the posterior."""
-        if not name or name in self.classes:
-            remedy = f"the known ones are {', '.join(self.classes)}"
-            raise InputError(f"concept '{name}'", "is empty or already known", remedy)
         self.classes = (*self.classes, name)
         self._set_prior(self._prior.grow())
 

@@ -1,8 +1,4 @@
-"""The paper's claims in sentences (``claims.yaml``), the verdict on each from a run's differences, and their table.
-
-A difference is taken seed by seed, with Student's interval over the seeds. Shares of samples with stored predictions
-have a second interval, by the bootstrap over clusters and seeds with common draws; the outermost bounds count.
-"""
+"""The paper's claims in sentences (``claims.yaml``), the verdict on each from a run's differences, and their table."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -15,7 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gpca.attribution.diagnostics import calibration_error
-from gpca.attribution.predictions import concepts_of, read_predictions
+from gpca.attribution.learner_predictions import probabilities
+from gpca.attribution.predictions import read_predictions
 from gpca.comparison.published import UNITS, Counterpart
 from gpca.comparison.values import RUNTIME, ShareDraws, runtime_mean, values_by_seed
 from gpca.comparison.verdicts import INCONCLUSIVE, NOT_COMPARABLE, NOT_RUN
@@ -77,8 +74,7 @@ class ClaimDifference:
     value: float
     bounds: Mapping[float, tuple[float, float]]  # of its interval, by level
     n: int  # repeats
-    at_least: bool = False  # the difference is a lower or an upper bound, as some repeats were censored
-    at_most: bool = False
+    censored: Sequence[bool] = (False, False)  # whether some repeats were, of the first value and of the second
     at_floor: bool = False  # both values are at the unit's minimum in at least half of the repeats
 
 
@@ -153,8 +149,8 @@ def judge(
                 elif difference.at_floor:
                     verdicts = [INCONCLUSIVE] * 2
                 else:
-                    censored = difference.at_least, difference.at_most
-                    verdicts = [verdict_of_interval(claim, *difference.bounds[level], *censored) for level in levels]
+                    bounds = (difference.bounds[level] for level in levels)
+                    verdicts = [verdict_of_interval(claim, *each, *difference.censored) for each in bounds]
             rows.append(fields | row | {"verdict": verdicts[0]})
             strict_verdicts.append(verdicts[1])
         found = {row["verdict"] for row in rows}
@@ -237,8 +233,7 @@ def difference_of(
     at_floor = False
     if floor is not None and len(compared.counterparts) == 2:
         at_floor = bool(((values[0] <= floor) & (values[1] <= floor)).mean() >= 0.5)
-    at_least, at_most = censored
-    return ClaimDifference(float(difference_R.mean()), bounds, len(difference_R), at_least, at_most, at_floor)
+    return ClaimDifference(float(difference_R.mean()), bounds, len(difference_R), censored, at_floor)
 
 
 def _cluster_bounds(
@@ -287,10 +282,8 @@ def score_measures(claims: Sequence[Claim], prediction_files: Iterable[str | Pat
         if (source, method) in wanted and Path(path).parts[-4] == PREDICTIONS:
             rows = read_predictions(path)
             rows = rows[(rows["split"] == "test") & ~rows["abstained"]]
-            concepts = concepts_of(rows)
-            scores_S_C = rows[[f"score_{concept}" for concept in concepts]].to_numpy(float)
+            scores_S_C, target_S = probabilities(rows)
             p_S_C = scores_S_C / scores_S_C.sum(axis=1, keepdims=True)
-            target_S = np.array([concepts.index(concept) for concept in rows["concept_true"]])
             values = {"ece": calibration_error(p_S_C, target_S), "separability": separability(p_S_C, target_S)}
             records += [("scores", source, method, name, ALL, seed, value) for name, value in values.items()]
     return pd.DataFrame(records, columns=list(TIDY_COLUMNS))
@@ -375,14 +368,12 @@ def claims(verdicts: Frame, sources: Mapping[str, Mapping], titles: Mapping[str,
 
 
 def counted(verdicts: Frame) -> str:
-    """Return how many sentences have each verdict, in words."""
     counts = verdicts.drop_duplicates("claim")["claim_verdict"].value_counts(sort=False)
     phrases = (f"{counts[verdict]} {verdict}" for verdict in CLAIM_VERDICTS if verdict in counts)
     return f"Of {counts.sum()} sentences: {', '.join(phrases)}."
 
 
 def margins_in_words(verdicts: Frame) -> list[str]:
-    """Return a sentence on when the margins of the claims were set, and what was known by then."""
     once = verdicts.drop_duplicates("claim")
     phrases = []
     for (day, seen), day_rows in once[once["test"] != ""].groupby(["margin_set", "values_known"], sort=True):

@@ -56,6 +56,7 @@ VERDICT_COLUMNS = (
     *("joint", "joint_at_least", "joint_close", "n", "readings", "readings_close"),
 )
 FLAGS = ("at_least", "close", "joint_at_least", "joint_close")
+MOST_SHOWN = 20  # of the best readings
 Joint = dict[str, Any]  # a value of every choice
 Record = tuple[str, str, str, float]  # table or "all", method, metric, value
 
@@ -66,7 +67,6 @@ def part_name(part: str, joint: Joint) -> str:
 
 
 def text_of(value: Any) -> str:
-    """A value of a choice as names and files have it."""
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
@@ -103,7 +103,6 @@ def search(
     grid: Mapping[str, Sequence[Any]],
     tolerances: Mapping[str, Tolerance],
     deals: int,
-    shown: int = 20,
 ) -> Found:
     """Search every joint reading of a grid, which holds the values of every choice, the protocol's first."""
     shape = tuple(len(grid[choice]) for choice in CHOICES)
@@ -124,7 +123,7 @@ def search(
     share_G = _shares(closes, index_K, weight_K, shape)
     order = np.argsort(-np.round(share_G.ravel(), 9), kind="stable")
     best = []
-    for index in order[:shown]:
+    for index in order[:MOST_SHOWN]:
         axes_at = zip(CHOICES, np.unravel_index(index, shape), strict=True)
         best.append(({choice: grid[choice][int(i)] for choice, i in axes_at}, float(share_G.ravel()[index])))
     best_at = np.unravel_index(order[0], shape)
@@ -174,10 +173,9 @@ def scores(
     """Numbers and close ones of each table and of all, their share with equal weights of the tables, its chance."""
     records: list[Record] = []
     tables = np.array([number.table for number in numbers])
-    for table in dict.fromkeys(tables):
-        in_table_k = close_K[tables == table]
-        records += [(table, method, "numbers", len(in_table_k)), (table, method, "close", in_table_k.sum())]
-    records += [("all", method, "numbers", len(numbers)), ("all", method, "close", close_K.sum())]
+    parts = {table: close_K[tables == table] for table in dict.fromkeys(tables)} | {"all": close_K}
+    for table, close in parts.items():
+        records += [(table, method, "numbers", len(close)), (table, method, "close", close.sum())]
     records.append(("all", method, "share", share))
     for within, share_D in by_chance.items():
         records.append(("all", method, f"expected_{within}", share_D.mean()))
@@ -235,7 +233,6 @@ def judge(
 
 
 def read_verdicts(path: str | Path) -> Frame:
-    """Read the rows that :func:`judge` returned."""
     optional = ("upper", "reproduced")
     measured = ("published", "joint", "n", "readings", "readings_close", *optional)
     rows = read_numbers(path, VERDICT_COLUMNS, measured, optional=optional)
@@ -243,5 +240,4 @@ def read_verdicts(path: str | Path) -> Frame:
 
 
 def read_choices(path: str | Path) -> Frame:
-    """Read the values of the joint reading's choices: `choice`, `value`."""
     return read_csv(path, ("choice", "value"))

@@ -81,9 +81,9 @@ def counts_table(comparison: Frame, tolerances: Mapping[str, Tolerance]) -> str:
     for table, rows in once.groupby("table", sort=False):
         lines.append([_name(table), *(count or "" for count in counts(rows).values()), *cells(table)])
     lines.append(["All", *counts(once).values(), *cells(ALL)])
-    over_objects = counts(once.assign(verdict=once["over_objects"]))
-    lines.append(["All, by intervals over objects too", *(count or "" for count in over_objects.values()), "", "", ""])
-    for name, rows in (("Standard deviations", deviations), ("Repeats", repeats)):
+    over_objects = once.assign(verdict=once["over_objects"])
+    apart = {"All, by intervals over objects too": over_objects, "Standard deviations": deviations, "Repeats": repeats}
+    for name, rows in apart.items():
         if len(rows):
             lines.append([name, *(count or "" for count in counts(rows).values()), "", "", ""])
     return _joined(lines)

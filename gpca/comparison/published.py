@@ -128,7 +128,6 @@ def printed_seconds(numbers: Iterable[Number]) -> dict[str, Number]:
 
 
 def read_lines(path: Path) -> list[dict[str, str]]:
-    """Return the lines of a CSV file of the package, each by column."""
     with path.open(newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file, strict=True))
 
@@ -143,11 +142,9 @@ class Reason(NamedTuple):
 
 
 def read_reasons() -> list[Reason]:
-    """Return the reasons, in the order of the file."""
     return [Reason(*fields.values()) for fields in read_lines(REASONS)]
 
 
 def reason_of(number: Number, reasons: Sequence[Reason]) -> str:
-    """Return the first reason that applies to the number."""
     fitting = (reason for reason in reasons if all(map(fnmatchcase, number.key, reason[:3])))
     return next((reason.text for reason in fitting), NONE_YET)

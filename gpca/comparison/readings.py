@@ -38,12 +38,10 @@ def judge_readings(
         if (counterpart := number.counterpart) is None:
             continue
         shared = (*number.key, number.unit, number.value, number.upper, *judged.loc[number.key])
-        for name, rows in rows_by_place.get(
-            (*counterpart.sources, *counterpart.methods, counterpart.concept), {}
-        ).items():
+        place = (*counterpart.sources, *counterpart.methods, counterpart.concept)
+        for name, rows in rows_by_place[place].items():
             there = replace(number, counterpart=replace(counterpart, file=READINGS, table=name))
-            reproduced = value_of_run(there, {READINGS: rows})
-            if reproduced is None:
+            if (reproduced := value_of_run(there, {READINGS: rows})) is None:
                 continue
             group, _, reading = name.partition("/")
             apart = distance(number, reproduced.value, tolerances[number.unit])
@@ -131,7 +129,6 @@ def summarize(judged: Frame) -> dict[tuple[str, str, str], dict[str, GroupSummar
 
 
 def sentence(groups: Mapping[str, GroupSummary], words: ModuleType) -> str:
-    """Return the sentences of a reason about the readings, one for each group."""
     sentences = []
     for name, of in groups.items():
         span, nearest = f"{of.least:.3g} to {of.most:.3g}", f"{of.value:.3g} ({words.reading(name, of.nearest)})"
@@ -156,7 +153,6 @@ def with_readings(comparison: Frame, judged: Frame, words: ModuleType) -> Frame:
 
 
 def read_judged(path: str | Path) -> Frame:
-    """Read the rows that :func:`judge_readings` returned."""
     rows = read_csv(path, READING_COLUMNS)
     needed = {"distance": rows["distance"] != "-inf", "reproduced": rows["reproduced"] != ""}  # -inf: ratio of zero
     for column in ("published", "upper", "value", "n", "chance", "distance", "reproduced"):

@@ -1,8 +1,4 @@
-"""Compares a run's CSV files with a reference run's: identical, within rounding, or different.
-
-Where libraries round otherwise, a trained encoder decides some samples otherwise. If two runs differ on a sample with
-probability d, shares of n samples differ with the standard deviation √(d / n) (docs/comparison.md).
-"""
+"""Compares a run's CSV files with a reference run's: identical, within rounding, or different (docs/comparison.md)."""
 
 import math
 from collections import Counter, defaultdict
@@ -122,7 +118,6 @@ def check_reference(run: Path, reference: Path, allowance: Allowance) -> list[Fi
 
 
 def _compared(file: str, here: Mapping[tuple, Mean], there: Mapping[tuple, Mean], allowance: Allowance):
-    """Return the verdict on a file's means, and its details."""
     for one, other, verb in ((there, here, "lacks"), (here, there, "adds to the reference")):
         if extra := [key for key in one if key not in other]:
             return DIFFERENT, f"{verb} {len(extra)} of {len(one)} values, such as {' / '.join(extra[0])}"
@@ -197,7 +192,6 @@ def read_means(path: Path, samples_of_source: Mapping[str, int] = MappingProxyTy
 
 @cache
 def kind_of(file: str, quantity: str) -> str:
-    """Return the kind of a quantity in a file."""
     return next(kind for files, names, kind in KINDS if fnmatchcase(file, files) and fnmatchcase(quantity, names))
 
 

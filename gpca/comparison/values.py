@@ -79,7 +79,6 @@ def mean_bounds(mean: float, deviation: float, n: int, unit: Unit, samples: int 
 
 
 def read_results(paths: Iterable[str | Path]) -> dict[str, pd.DataFrame]:
-    """Read a run's collected files, by name."""
     return {Path(path).name: (read_runtime if Path(path).name == RUNTIME else read_metrics)(path) for path in paths}
 
 
@@ -166,7 +165,6 @@ def folder_behind(counterpart: Counterpart | None) -> Folder | None:
 
 
 def folders_behind(counterparts: Iterable[Counterpart | None]) -> list[Folder]:
-    """Return the folders of all counterparts, each once."""
     return sorted({folder for counterpart in counterparts if (folder := folder_behind(counterpart))})
 
 

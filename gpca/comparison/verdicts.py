@@ -217,9 +217,8 @@ def compare(
         if counterpart and counterpart.file in results and number.unit in TIMES:
             record["hardware"] = hardware
             if counterpart.file == RUNTIME:
-                timed = results[RUNTIME]
-                machines = timed.loc[timed["device"] == counterpart.concept, "hardware"].unique()
-                record["hardware"] = ", ".join(machines)
+                by_device = results[RUNTIME].groupby("device")["hardware"].unique()
+                record["hardware"] = ", ".join(by_device.get(counterpart.concept, ()))
         records.append(record)
     return pd.DataFrame(records, columns=list(COMPARISON_COLUMNS)).astype({"n": "Int64", "n_needed": "Int64"})
 
@@ -230,7 +229,6 @@ def judged_once(comparison: Frame) -> Frame:
 
 
 def counts(comparison: Frame) -> dict[str, int]:
-    """Return verdict -> number of rows."""
     return {verdict: int((comparison["verdict"] == verdict).sum()) for verdict in VERDICTS}
 
 

@@ -77,23 +77,8 @@ def distinct_edges(neighbors, counts, n_points):
 
 
 @njit(**OVER_CLOUDS)
-def gather(a, c, point, ends, batch):
-    """Return y_e = a_j + c_g (E, F) for the edges from group g to point j; a (P, F), c (G, F)."""
-    features = a.shape[1]
-    y = np.empty((len(point), features), a.dtype)
-    groups = len(c) // batch
-    for b in prange(batch):
-        for g in range(b * groups, (b + 1) * groups):
-            for e in range(ends[g], ends[g + 1]):
-                j = point[e]
-                for f in range(features):
-                    y[e, f] = a[j, f] + c[g, f]
-    return y
-
-
-@njit(**OVER_CLOUDS)
 def gather_backward(grad_y, point, ends, batch, n_rows):
-    """Return the gradients of :func:`gather` with respect to a (P, F) and c (G, F)."""
+    """Return the gradients of a_j + c_g (E, F) with respect to a (P, F) and c (G, F)."""
     features = grad_y.shape[1]
     grad_a = np.zeros((n_rows, features), grad_y.dtype)
     grad_c = np.zeros((len(ends) - 1, features), grad_y.dtype)

@@ -98,7 +98,6 @@ class BoostedQuestion:
         return expit(self.log_odds(inputs_N_F))
 
     def log_odds(self, inputs_N_F: np.ndarray) -> np.ndarray:
-        """Return the logarithm of the odds of yes (N,)."""
         at_N_T = np.repeat(self.roots[None], len(inputs_N_F), axis=0)
         while (inner_N_T := self.feature[at_N_T] != LEAF).any():
             rows, columns = np.nonzero(inner_N_T)

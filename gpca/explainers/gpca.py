@@ -20,7 +20,6 @@ class GPCA(ScoringExplainer):
         self._gpc.fit(self._inputs(registrations), registrations.concept)
 
     def learn(self, registrations: Registrations) -> None:
-        """Learn further labels (:meth:`gpca.classifier.gpc.GPC.update`)."""
         self._gpc.update(self._inputs(registrations), registrations.concept)
 
     def summary(self, registrations: Registrations) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -45,7 +44,6 @@ class DescriptorGPCA(GPCA):
         self._gpc.fit(self._normalized(features_N_F), registrations.concept)
 
     def features(self, registrations: Registrations) -> np.ndarray:
-        """Return the descriptors (N, F)."""
         raise NotImplementedError
 
     def _inputs(self, registrations: Registrations) -> np.ndarray:

@@ -95,7 +95,6 @@ class ScoringExplainer:
         """Learn nothing; explainers that learn override this."""
 
     def explain(self, registrations: Registrations) -> Attribution:
-        """Score every registration."""
         started = perf_counter()
         scores_N_C, variances_N_C, bald_N = self.summary(registrations)
         seconds = (perf_counter() - started) / len(registrations)
@@ -108,7 +107,6 @@ class ScoringExplainer:
         return self.scores(registrations), None, None
 
     def scores(self, registrations: Registrations) -> np.ndarray:
-        """Return the scores (N, C)."""
         raise NotImplementedError
 
 
@@ -131,7 +129,6 @@ class ClassifierExplainer(ScoringExplainer):
         return self._classifier.scores(self.features(registrations))
 
     def features(self, registrations: Registrations) -> np.ndarray:
-        """Return the classifier's features (N, F)."""
         raise NotImplementedError
 
 
@@ -182,7 +179,6 @@ class ExplainerEntry:
 
     @property
     def sight(self) -> str:
-        """What it sees, in words."""
         return in_words(self.sees)
 
     @property

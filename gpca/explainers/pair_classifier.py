@@ -108,7 +108,6 @@ class PairClassifier:
 
     @property
     def samples(self) -> int:
-        """The number of training samples."""
         return len(self._failure.learned_N_d)
 
     def state(self) -> dict[str, object]:

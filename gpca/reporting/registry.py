@@ -44,8 +44,7 @@ class Result:
     @property
     def modules(self) -> list[str]:
         """The modules that make it: its builder's and its readers'."""
-        functions = [self.builder, *(source.read for source in self.inputs if source.read)]
-        return [function.split(":")[0] for function in functions]
+        return [function.split(":")[0] for function in (self.builder, *self.readers.values()) if function]
 
     @property
     def readers(self) -> dict[str, str]:

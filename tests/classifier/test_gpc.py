@@ -9,7 +9,6 @@ from sklearn.preprocessing import StandardScaler
 from gpca.classifier.gpc import GPC
 from gpca.classifier.prior import COVARIANCES, Standardization
 from gpca.classifier.settings import GPCSettings
-from gpca.errors import InputError
 
 CLASSES = ("noise", "pose", "overlap")
 QUICK = GPCSettings(learning_rate=0.05, iterations=40, inducing=12, draws=200)
@@ -186,13 +185,6 @@ def test_a_class_added_later_costs_the_others_nothing_and_is_learned(kernel):
     gpc.grow("fog")
     assert gpc.attribute(H_TEST)[0].shape == (90, 5)
     assert accuracy(gpc, H_TEST, LABELS_TEST) > 0.95
-
-
-@pytest.mark.parametrize("name", ["", "pose"])
-def test_a_class_without_a_name_of_its_own_is_not_added(gpc, name):
-    with pytest.raises(InputError, match=f"concept '{name}': is empty or already known"):
-        gpc.grow(name)
-    assert gpc.classes == CLASSES
 
 
 def kernel_parameters(gpc):

@@ -54,10 +54,10 @@ def view_from(azimuth_rad: float, elevation_rad: float = np.radians(22.0)) -> np
     return np.array([right, np.cross(towards, right), towards])
 
 
-def widest_views(cloud_P_3: np.ndarray, count: int = 8) -> list[np.ndarray]:
-    """Return those of 24 views around a cloud that show it widest: a mug with its handle at the side."""
+def widest_views(cloud_P_3: np.ndarray) -> list[np.ndarray]:
+    """Return eight of 24 views around a cloud that show it widest: a mug with its handle at the side."""
     views = [view_from(azimuth) for azimuth in np.linspace(0, 2 * np.pi, 24, endpoint=False)]
-    return sorted(views, key=lambda view: -np.std(cloud_P_3 @ view[0]))[:count]
+    return sorted(views, key=lambda view: -np.std(cloud_P_3 @ view[0]))[:8]
 
 
 def draw_query(cloud_P_3: np.ndarray, target_Q_3: np.ndarray, title: str, png_path: str | Path) -> None:

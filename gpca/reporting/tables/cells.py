@@ -25,7 +25,6 @@ def where(frame: pd.DataFrame, entries: Mapping[str, object]) -> pd.DataFrame:
 
 
 def rows_where(frame: pd.DataFrame, **wanted: object) -> pd.DataFrame:
-    """Return the rows with these entries, e.g. ``rows_where(metrics, source="ycb", concept="all")``."""
     return where(frame, wanted)
 
 
@@ -89,5 +88,4 @@ def interval_cell(row: pd.Series, value: str = "value", bounds: Sequence[str] = 
 
 
 def plain_cell(value: float, seeds: int, test_samples: int) -> Cell:
-    """Return a number that has no interval."""
     return Cell(value, nan, seeds, test_samples)

@@ -164,8 +164,7 @@ class Table:
             for row in printed["rows"]
         ]
         table = "\n".join(f"| {' | '.join(row)} |" for row in (printed["heads"], rule, *body))
-        notes = [note, *self.footnotes] if note else self.footnotes
-        return "\n\n".join([f"**{self.numbered_caption}**", table, *notes]) + "\n"
+        return "\n\n".join(filter(None, [f"**{self.numbered_caption}**", table, note, *self.footnotes])) + "\n"
 
 
 def short(table: Table) -> Table:
