@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gpca.errors import InputError, require_known
+from gpca.errors import InputError
 from gpca.io.arrays import require_numbers
-from gpca.process.plugins import joined_outside, module_outside
+from gpca.process.registry import Registry
 
 EXPANSION = 4  # K: BALD with k-means clusters the B·K most uncertain samples
 MOST_STEPS = 100  # of k-means
@@ -37,18 +37,8 @@ class Strategy:
     needs_scores: bool = True  # whether it reads the classifier's scores
 
 
-def strategies() -> dict[str, Strategy]:
-    return joined_outside("STRATEGIES", "strategy", Strategy, STRATEGIES)
-
-
-def strategy_module(name: str) -> str | None:
-    """Return the plugin module that lists the strategy; None for built-in strategies."""
-    return module_outside("STRATEGIES", "strategy", Strategy, name)
-
-
-def require_strategy(name: str) -> Strategy:
-    require_known("strategy", name, strategies())
-    return strategies()[name]
+REGISTRY: Registry[Strategy] = Registry("strategy", "", "STRATEGIES", first=(__name__,), outside=Strategy)
+strategies, require_strategy, strategy_module = REGISTRY.entries, REGISTRY.entry, REGISTRY.module
 
 
 def select(name: str, pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:

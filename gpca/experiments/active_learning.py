@@ -105,7 +105,7 @@ LEARN = Step(
     },
     outputs={"out": "active_learning/{source}/{*strategy}/seed{seed}.csv"},
     settings=_seed_settings,
-    modules=lambda plan: filter(None, map(strategy_module, plan.names["strategy"])),
+    modules=lambda plan: [strategy_module(name) for name in plan.names["strategy"] if name not in STREAMS],
     priority=4,
 )
 

@@ -177,7 +177,7 @@ RECOVER = Step(
     modules=lambda plan: [
         plan.encoder_module,
         *map(explainer_module, explained(plan)),
-        *filter(None, map(policy_module, plan.config["recovery"]["policies"])),
+        *(policy_module(name) for name in plan.config["recovery"]["policies"] if name in named_policies()),
         *source_modules(standing(plan)),
     ],
     priority=6,

@@ -88,12 +88,6 @@ def joined_outside(variable: str, kind: str, of: type, entries: Mapping[str, Any
     return dict(entries) | {name: entry for listed in outside.values() for name, entry in listed.items()}
 
 
-def module_outside(variable: str, kind: str, of: type, name: str) -> str | None:
-    """Return the plugin that lists a name in a variable, or None."""
-    outside = entries_outside(variable, kind, of, ())
-    return next((module for module, entries in outside.items() if name in entries), None)
-
-
 def names_outside() -> set[str]:
     """Return the names of all entries of plugins, of any kind."""
     modules = _modules(GROUPS).values()

@@ -17,7 +17,7 @@ class Registry(Generic[Entry]):
     """All entries of a kind, such as registration methods; files that are new in the folder need no further listing."""
 
     kind: str  # name of an entry in messages
-    folder: str  # package of the modules that list entries
+    folder: str  # package of the modules that list entries; empty for those elsewhere alone
     variable: str  # of a module, its entries by name
     first: Sequence[str] = ()  # modules elsewhere, whose entries come first,
     last: Sequence[str] = ()  # or after those of the folder
@@ -40,7 +40,8 @@ class Registry(Generic[Entry]):
 
     def by_module(self) -> dict[str, dict[str, Entry]]:
         """Return the entries of each module."""
-        files = {file for folder in import_module(self.folder).__path__ for file in os.listdir(folder)}
+        folders = import_module(self.folder).__path__ if self.folder else ()
+        files = {file for folder in folders for file in os.listdir(folder)}
         names = sorted(f"{self.folder}.{file[:-3]}" for file in files if file.endswith(".py") and file != "__init__.py")
         modules = (*self.first, *names, *self.last)
         by_module = {module: getattr(import_module(module), self.variable, {}) for module in modules}

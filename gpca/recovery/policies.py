@@ -13,7 +13,7 @@ import numpy as np
 from gpca.causes.policy import NOTHING, Decision, RecoveryPolicy, Thresholds, Treated
 from gpca.errors import require_known
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.process.plugins import joined_outside, module_outside
+from gpca.process.registry import Registry
 from gpca.recovery.chances import ExpectedUtility, FailureGate
 
 if TYPE_CHECKING:
@@ -194,12 +194,8 @@ POLICIES = {
 }
 
 
-def named_policies() -> dict[str, PolicyEntry]:
-    return joined_outside("POLICIES", "recovery policy", PolicyEntry, POLICIES)
-
-
-def policy_module(name: str) -> str | None:
-    return module_outside("POLICIES", "recovery policy", PolicyEntry, name)
+REGISTRY: Registry[PolicyEntry] = Registry("recovery policy", "", "POLICIES", first=(__name__,), outside=PolicyEntry)
+named_policies, policy_module = REGISTRY.entries, REGISTRY.module
 
 
 def is_fixed(name: str, actions: Sequence[str]) -> bool:
