@@ -84,38 +84,29 @@ def boosting(
 
 
 class CausePairGPCA(DescriptorGPCA):
-    """GP-CA on the descriptors of the parts that it sees."""
+    """GP-CA on the `wanted` columns of the parts that it sees."""
 
     labels = LABELS
 
-    wanted = EVERYTHING
-
-    def __init__(self, sees: Sees, source: str, seed: int, **settings: GPCArguments) -> None:
+    def __init__(self, wanted: Columns, sees: Sees, source: str, seed: int, **settings: GPCArguments) -> None:
         axes = (source, seed, "reenactment" if "reenactment" in sees else "causes")
         super().__init__(axes, source, seed, **settings)
-        self._sees = sees
+        self._sees, self._wanted = sees, wanted
 
     def features(self, registrations: Registrations) -> np.ndarray:
-        return described(registrations, self._sees, self.wanted)
-
-
-class QuickGPCA(CausePairGPCA):
-    """The same on quick descriptors alone, which further samples have."""
-
-    wanted = dict.fromkeys(QUICK, EVERY)
+        return described(registrations, self._sees, self._wanted)
 
 
 class Committee(interface.ScoringExplainer):
     """The mean of three explainers of different kinds, whose errors differ."""
 
     labels = LABELS
-    gpca: type[CausePairGPCA] = CausePairGPCA
 
-    def __init__(self, sees: Sees, source: str, seed: int) -> None:
+    def __init__(self, wanted: Columns, sees: Sees, source: str, seed: int) -> None:
         self._members: list[interface.ConceptExplainer] = [
-            DescriptorClassifier(randomized_trees(source, seed), sees, self.gpca.wanted),
-            DescriptorClassifier(boosted_trees(source, seed), sees, self.gpca.wanted),
-            self.gpca(sees, source, seed, learning_rate=0.1, iterations=200),
+            DescriptorClassifier(randomized_trees(source, seed), sees, wanted),
+            DescriptorClassifier(boosted_trees(source, seed), sees, wanted),
+            CausePairGPCA(wanted, sees, source, seed, learning_rate=0.1, iterations=200),
         ]
 
     def fit(self, registrations: Registrations) -> None:
@@ -124,12 +115,6 @@ class Committee(interface.ScoringExplainer):
 
     def scores(self, registrations: Registrations) -> np.ndarray:
         return np.mean([member.explain(registrations).scores_N_C for member in self._members], axis=0)
-
-
-class QuickCommittee(Committee):
-    """The same on quick descriptors alone."""
-
-    gpca = QuickGPCA
 
 
 class Reenact(interface.ScoringExplainer):
@@ -164,17 +149,15 @@ class AlignmentClassifier(Alarm):
     def fit(self, registrations: Registrations) -> None:
         """Learn from labeled registrations; if all are nominal, or all failed, predict the same for all."""
         failed_N = registrations.concept != NOMINAL
-        self._constant = float(failed_N.mean()) if failed_N.all() or not failed_N.any() else None
-        if self._constant is None:
+        self._failures = float(failed_N.mean())
+        if 0 < self._failures < 1:
             self._classifier.fit(described(registrations, self._sees, self._wanted), failed_N)
 
     def scores(self, registrations: Registrations) -> np.ndarray:
-        if self._constant is None:
-            features_N_F = described(registrations, self._sees, self._wanted)
-            failure_N = self._classifier.predict_proba(features_N_F)[:, 1]
-        else:
-            failure_N = np.full(len(registrations), self._constant)
-        return even_scores(failure_N)
+        if self._failures in (0, 1):
+            return even_scores(np.full(len(registrations), self._failures))
+        features_N_F = described(registrations, self._sees, self._wanted)
+        return even_scores(self._classifier.predict_proba(features_N_F)[:, 1])
 
 
 class Result(Alarm):
@@ -226,15 +209,19 @@ _density = partial(regression, {"planes": DENSITIES})
 _distances = partial(forest, {"distances": EVERY, "motion": EVERY})
 
 
+_gpca, _committee = partial(CausePairGPCA, EVERYTHING), partial(Committee, EVERYTHING)
+_quick = dict.fromkeys(QUICK, EVERY)  # descriptors that further samples have
+
+
 def _further(title: str, make: Callable[..., interface.ConceptExplainer]) -> ExplainerEntry:
-    return replace(entry(title, make, WITH_RUNS), further=True)
+    return replace(entry(title, partial(make, _quick), WITH_RUNS), further=True)
 
 
 _reenacted = partial(ExplainerEntry, sees=REENACTMENT, reads=interface.REENACTED)
 EXPLAINERS = {  # of the hard samples, all of which failed
     "reenact": _reenacted("Re-enactment (untrained)", partial(OfFailed, Reenact)),
     "reenact_committee": _reenacted(
-        "Committee on the re-enactment", partial(OfFailed, partial(Committee, REENACTMENT))
+        "Committee on the re-enactment", partial(OfFailed, partial(_committee, REENACTMENT))
     ),
 }
 CAUSE_EXPLAINERS = {
@@ -248,17 +235,17 @@ CAUSE_EXPLAINERS = {
     "pair_forest_clouds": entry(f"Distances of the pair (forest), {WITHOUT}", _distances, CLOUDS),
     "pair_boosting": entry("All descriptors (boosting)", boosting, ALL),
     "pair_boosting_clouds": entry(f"Descriptors (boosting), {WITHOUT}", boosting, CLOUDS),
-    "gpca_pair": entry("GP-CA on the pair", CausePairGPCA, ALL),
-    "gpca_pair_clouds": entry(f"GP-CA on the pair, {WITHOUT}", CausePairGPCA, CLOUDS),
-    "gpca_further": _further("GP-CA on the pair, further samples", QuickGPCA),
-    "committee_further": _further("Committee on the pair, further samples", QuickCommittee),
-    "pair_committee": entry("Committee on the pair", Committee, ALL),
-    "pair_committee_clouds": entry(f"Committee on the pair, {WITHOUT}", Committee, CLOUDS),
+    "gpca_pair": entry("GP-CA on the pair", _gpca, ALL),
+    "gpca_pair_clouds": entry(f"GP-CA on the pair, {WITHOUT}", _gpca, CLOUDS),
+    "gpca_further": _further("GP-CA on the pair, further samples", CausePairGPCA),
+    "committee_further": _further("Committee on the pair, further samples", Committee),
+    "pair_committee": entry("Committee on the pair", _committee, ALL),
+    "pair_committee_clouds": entry(f"Committee on the pair, {WITHOUT}", _committee, CLOUDS),
     "reenact": _reenacted("Re-enactment (untrained)", Reenact),
     "result": _reenacted("Judge of the result, as gpca explain", Result),
-    "reenact_committee": _reenacted("Committee on the re-enactment", partial(Committee, REENACTMENT)),
+    "reenact_committee": _reenacted("Committee on the re-enactment", partial(_committee, REENACTMENT)),
 }
 for level, sight in LEVELS.items():
     words = interface.in_words(sight)
     CAUSE_EXPLAINERS[f"trees_on_{level}"] = entry(f"Forest on {words}", partial(forest, EVERYTHING), sight)
-    CAUSE_EXPLAINERS[f"gpca_on_{level}"] = entry(f"GP-CA's classifier on {words}", CausePairGPCA, sight)
+    CAUSE_EXPLAINERS[f"gpca_on_{level}"] = entry(f"GP-CA's classifier on {words}", _gpca, sight)

@@ -56,11 +56,11 @@ class Heads:
         optimizer = Adam(self._layers, self._learning_rate, self._weight_decay)
         for step in range(self._steps):
             rows_E_B = torch.rand((self._heads, len(targets_N)), generator=random).argsort(dim=1)[:, :BATCH_SIZE]
-            hidden_E_B_H = self._hidden_units(inputs_N_d[rows_E_B])
+            hidden_E_B_H = self._layer(0, inputs_N_d[rows_E_B]).relu()
             if self._rate:
                 kept = torch.rand(hidden_E_B_H.shape, generator=random) >= self._rate
                 hidden_E_B_H = hidden_E_B_H * kept / (1 - self._rate)
-            logits_E_B_C = self._last_layer(hidden_E_B_H)
+            logits_E_B_C = self._layer(1, hidden_E_B_H)
             loss = torch.nn.functional.cross_entropy(logits_E_B_C.flatten(0, 1), targets_N[rows_E_B].flatten())
             optimizer.zero_grad()
             # Scaled so that a head's gradient is that of its loss, however many are trained beside it.
@@ -71,26 +71,22 @@ class Heads:
 
     def hidden(self, h_N_d: np.ndarray) -> np.ndarray:
         """Return the hidden units (E, N, H) of the embeddings."""
-        return self._hidden_units(self._inputs(h_N_d)).detach().numpy()
+        return self._layer(0, self._inputs(h_N_d)).relu().detach().numpy()
 
     def logits(self, hidden_E_N_H: np.ndarray) -> np.ndarray:
         """Return the last layer's logits (E, N, C)."""
         import torch
 
-        return self._last_layer(torch.from_numpy(hidden_E_N_H)).detach().numpy()
+        return self._layer(1, torch.from_numpy(hidden_E_N_H)).detach().numpy()
 
     def _inputs(self, h_N_d: np.ndarray):
         import torch
 
         return torch.from_numpy(self._scaler.transform(h_N_d).astype(np.float32))
 
-    def _hidden_units(self, inputs):
-        weight, bias = self._layers[:2]
-        return (inputs @ weight + bias).relu()
-
-    def _last_layer(self, hidden):
-        weight, bias = self._layers[2:]
-        return hidden @ weight + bias
+    def _layer(self, number: int, inputs):
+        weight, bias = self._layers[2 * number : 2 * number + 2]
+        return inputs @ weight + bias
 
 
 HeadArguments = Annotated[Any, ArgumentsOf(Heads)]  # keyword arguments passed on to it

@@ -9,24 +9,16 @@ from functools import partial
 
 import numpy as np
 
+from baselines.pair import WITH_MOTION
 from baselines.untrained import GatedRule, Rule
 from gpca.explainers.classifiers import standardized_regression
-from gpca.explainers.interface import (
-    REENACTED,
-    ClassifierExplainer,
-    ExplainerEntry,
-    Sees,
-    attached,
-    for_causes,
-    measured,
-)
+from gpca.explainers.interface import REENACTED, ClassifierExplainer, ExplainerEntry, attached, for_causes, measured
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.trivial import TRIVIAL, trivial_numbers_of
 from gpca.seeds import seed_of
 from gpca.settings import Count, Positive
 
-SEES: Sees = ("pair", "motion")
 LEVELS = 40  # quantiles of the training samples that are tried as a constant
 HYPOTHESIS = ("noise", "outliers", "missing", "to_start", "to_result")  # of what is measured under the best hypothesis
 OBSERVED, MODEL = (
@@ -100,9 +92,11 @@ def _entries(of: Callable[[type], type], rule: ExplainerEntry) -> dict[str, Expl
     classifier = of(TrivialClassifier)
     return {
         "rule_fitted": rule,
-        "tree_trivial": ExplainerEntry("Tree of depth 3 on ten trivial numbers", partial(tree, classifier), SEES),
+        "tree_trivial": ExplainerEntry(
+            "Tree of depth 3 on ten trivial numbers", partial(tree, classifier), WITH_MOTION
+        ),
         "logistic_trivial": ExplainerEntry(
-            "Logistic regression on ten trivial numbers", partial(logistic, classifier), SEES
+            "Logistic regression on ten trivial numbers", partial(logistic, classifier), WITH_MOTION
         ),
         "hypotheses": ExplainerEntry(
             "Hypotheses with thresholds, not enacted",
@@ -113,7 +107,7 @@ def _entries(of: Callable[[type], type], rule: ExplainerEntry) -> dict[str, Expl
     }
 
 
-EXPLAINERS = _entries(lambda explainer: explainer, ExplainerEntry("Rule, constants fitted", FittedRule, SEES))
+EXPLAINERS = _entries(lambda explainer: explainer, ExplainerEntry("Rule, constants fitted", FittedRule, WITH_MOTION))
 CAUSE_EXPLAINERS = _entries(
     for_causes,
     ExplainerEntry(

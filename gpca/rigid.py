@@ -119,10 +119,7 @@ def adjoint(T_b_a: np.ndarray) -> np.ndarray:
 
 def point_jacobians(points_N_3: np.ndarray) -> np.ndarray:
     """Return ∂y/∂ξ = [-[y], I] (N, 3, 6) of points moved by a twist on the left."""
-    jacobians_N_3_6 = np.zeros((len(points_N_3), 3, 6))
-    jacobians_N_3_6[:, :, :3] = -_cross(points_N_3)
-    jacobians_N_3_6[:, :, 3:] = np.eye(3)
-    return jacobians_N_3_6
+    return np.concatenate([-_cross(points_N_3), np.tile(np.eye(3), (len(points_N_3), 1, 1))], axis=2)
 
 
 def _cross(vectors_n_3: np.ndarray) -> np.ndarray:

@@ -25,15 +25,10 @@ DESIGNS = ("additive", "latin", "saltelli", "oracle", "removal", "causal")  # gp
 
 
 @dataclass(frozen=True)
-class NoReduction:
-    """No settings."""
-
-
-@dataclass(frozen=True)
 class Reductions:
     """The reductions of embeddings, by name."""
 
-    none: NoReduction = field(default_factory=NoReduction)
+    none: Annotated[dict, Keys({})] = field(default_factory=dict)
     pca: PCA = field(default_factory=PCA)
     umap: UMAP = field(default_factory=UMAP)
     autoencoder: Autoencoder = field(default_factory=Autoencoder)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
 from math import floor
 from pathlib import Path
 from typing import NamedTuple
@@ -148,12 +147,14 @@ def answers_of(scored: Scored, condition: Condition, settings: GuaranteeSettings
             tested_N = model_N & condition.tested & (family_N == family)
             calibration_N = model_N & condition.calibration & (family_N != family)
             samples, families = (probabilities_N_5[calibration_N], scored.state[calibration_N]), family_N[calibration_N]
-            made = {
-                BY_SAMPLE: partial(calibrate, *samples, **limits),
-                BY_STATE: partial(calibrate, *samples, **limits, by_state=True),
-                BY_FAMILY: partial(calibrate, *samples, families, **limits | risks),
+            further: dict[str, dict] = {
+                BY_SAMPLE: {},
+                BY_STATE: {"by_state": True},
+                BY_FAMILY: {"family_N": families} | risks,
             }
-            guarantees = {name: make() for name, make in made.items() if name in condition.variants}
+            guarantees = {
+                name: calibrate(*samples, **limits | further[name]) for name in further if name in condition.variants
+            }
             tested_n_5 = probabilities_N_5[tested_N]
             failure_n = 1 - tested_n_5[:, 0]
             sets.append({name: each.sets(tested_n_5) for name, each in guarantees.items()})

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from functools import partial
+from functools import cache, partial
 from time import perf_counter
 
 import numpy as np
@@ -106,30 +106,21 @@ def summary(means: Means) -> dict:
     }
 
 
-@dataclass
 class Reenactor:
-    """Re-enacts registrations of episodes on the tables of one run, from what their robots hold."""
+    """Re-enacts registrations of episodes after actions, which were taken, on the tables of one run, each once."""
 
-    settings: ReenactmentSettings
-    counterfactuals: CauseSettings
-    _models: dict[int, KnownModel] = field(default_factory=dict)
-    _beliefs: dict[tuple[Episode, Taken], Belief] = field(default_factory=dict)
-    _reenacted: dict[tuple[Episode, Taken], CauseEffects] = field(default_factory=dict)
+    def __init__(self, settings: ReenactmentSettings, counterfactuals: CauseSettings) -> None:
+        self._settings, self._counterfactuals = settings, counterfactuals
+        self._models: dict[int, KnownModel] = {}
+        self.believe, self.reenact = cache(self._believe), cache(self._reenact)
 
-    def believe(self, episode: Episode, actions: Taken = ()) -> Belief:
-        """The hypotheses after these actions, which were taken."""
-        if (key := (episode, actions)) not in self._beliefs:
-            holding, model, axes = self._case(episode, actions)
-            self._beliefs[key] = believe(holding, model, self.settings, self.counterfactuals, axes)
-        return self._beliefs[key]
+    def _believe(self, episode: Episode, actions: Taken) -> Belief:
+        holding, model, axes = self._case(episode, actions)
+        return believe(holding, model, self._settings, self._counterfactuals, axes)
 
-    def reenact(self, episode: Episode, actions: Taken = ()) -> CauseEffects:
-        """The counterfactuals of the registration after these actions, which were taken."""
-        if (key := (episode, actions)) not in self._reenacted:
-            holding, model, axes = self._case(episode, actions)
-            belief = self.believe(episode, actions)
-            self._reenacted[key] = reenact(belief, holding, model, self.counterfactuals, axes)
-        return self._reenacted[key]
+    def _reenact(self, episode: Episode, actions: Taken) -> CauseEffects:
+        holding, model, axes = self._case(episode, actions)
+        return reenact(self.believe(episode, actions), holding, model, self._counterfactuals, axes)
 
     def _case(self, episode: Episode, actions: Taken) -> tuple[Holding, KnownModel, tuple]:
         model = episode.situation.model
@@ -146,7 +137,9 @@ def calibrated_alarm(episodes: Iterable[Episode], reenactor: Reenactor, false_al
     if not good:
         fault = "has no good registration by which the alarm of the re-enactment can be set"
         raise InputError("recovery", fault, "raise recovery.calibration or recovery.rehearsals")
-    failures = [reenactor.believe(episode).failure for episode in progress(good, "good registrations for the alarm")]
+    failures = [
+        reenactor.believe(episode, ()).failure for episode in progress(good, "good registrations for the alarm")
+    ]
     return alarm_threshold(np.array(failures), false_alarms)
 
 

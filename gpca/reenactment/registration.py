@@ -8,15 +8,7 @@ from scipy.spatial import cKDTree
 
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.icp import ICPSettings
-from gpca.alignment.methods.interface import (
-    CORRESPONDENCE_DISTANCE,
-    FEWEST,
-    MAX_ITERATIONS,
-    FailedRegistration,
-    MethodEntry,
-    Outcome,
-    Pair,
-)
+from gpca.alignment.methods.interface import FEWEST, ITERATIONS, REACH, FailedRegistration, MethodEntry, Outcome, Pair
 from gpca.alignment.methods.local import align_compiled
 from gpca.reenactment.hypotheses import (
     LAST_ITERATIONS,
@@ -76,9 +68,7 @@ def pose_posterior(
     return np.stack([frame.pose(hypothesis.T) for hypothesis in hypotheses]), weights_of(hypotheses)
 
 
-def align(
-    prior: bool, pair: Pair, correspondence_distance: float = CORRESPONDENCE_DISTANCE, unit: Positive = 1.0
-) -> Outcome:
+def align(prior: bool, pair: Pair, correspondence_distance: float = REACH, unit: Positive = 1.0) -> Outcome:
     """Return the likeliest pose; `unit` is taken for the diameter of the target."""
     (T, *_), _ = pose_posterior(pair, ReenactmentSettings(), prior, unit)
     return Outcome.at(pair, T, correspondence_distance)
@@ -88,8 +78,8 @@ def align_from_many(
     by_likelihood: bool,
     pair: Pair,
     wide_distance: Positive = 0.25,
-    correspondence_distance: float = CORRESPONDENCE_DISTANCE,
-    max_iterations: int = MAX_ITERATIONS,
+    correspondence_distance: float = REACH,
+    max_iterations: int = ITERATIONS,
     overlap: PositiveShare = 0.9,
     points: Annotated[int, Bounds(minimum=FEWEST)] = 512,
     unit: Positive = 1.0,

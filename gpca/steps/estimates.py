@@ -13,7 +13,7 @@ from time import perf_counter
 import numpy as np
 
 from gpca.alignment.icp import ICPSettings
-from gpca.alignment.methods.interface import CORRESPONDENCE_DISTANCE, MAX_ITERATIONS, Pair
+from gpca.alignment.methods.interface import ITERATIONS, REACH, Pair
 from gpca.alignment.methods.registry import make_method
 from gpca.causes.candidate import Candidate, drawn_again
 from gpca.causes.dataset import Causes
@@ -52,7 +52,7 @@ from gpca.uncertainty.spread import divergence
 MOVED: Moved = "model"  # onto the observed cloud, as the causes' track has it
 LEVEL = 0.95  # of the region whose coverage is counted
 Clouds = Iterator[tuple[np.ndarray, np.ndarray]]  # (N, 3) of sources and (P, 3) of targets
-SETTINGS = ICPSettings("point_to_point", CORRESPONDENCE_DISTANCE, MAX_ITERATIONS)  # to points and to planes
+SETTINGS = ICPSettings("point_to_point", REACH, ITERATIONS)  # to points and to planes
 AT_ONCE = 50  # point-to-plane runs that go one step at a time together
 
 

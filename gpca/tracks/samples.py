@@ -182,75 +182,66 @@ def recipe_of(file: str, config: Mapping[str, Any]) -> Recipe:
     kind, *rest = PurePosixPath(file).with_suffix("").parts
     if kind == "timings":  # an output of the same step
         return recipe_of(f"{rest[1]}/{rest[0]}/{rest[2]}.npz", config)
-    data = {name: config[name] for name in ("data_dir", "downloads")}
-    icp = {"icp": config["registrations"]["icp"]}
-    frames = config["real_world"]
+    *_, source, name = (REAL_WORLD, *rest)  # files of all depth frames name no source
+    source = name if kind in ("objects", "instances") else source
+    given: dict[str, Any] = {"source": source}
+    given |= {"seed": int(name.removeprefix("seed"))} if name.startswith("seed") else {}
+    causes, controls, diagnosis, frames = (config[each] for each in ("causes", "controls", "diagnosis", "real_world"))
+    data = {each: config[each] for each in ("data_dir", "downloads")}
     frame_settings = {"datasets": frames["datasets"], "role": config["splits"]["role"]}
-    if kind in ("objects", "instances"):
-        source = rest[0]
-        given = {"source": source, **data, "surface_points": config["objects"]["surface_points"]}
-        if source != REAL_WORLD:
-            given |= {"settings": config["sources"][source]}
-            outputs = {"out": f"objects/{source}.npz"}
-            return Recipe("gpca.steps.pairs:objects", given, _splits("objects", config), outputs)
-        given |= {"settings": frame_settings | {"initial_pose": frames["initial_pose"]}}
-        outputs = {name: f"{name}/{source}.npz" for name in ("instances", "objects")}
-        return Recipe("gpca.steps.frames:instances", given, _splits("scenes", config), outputs)
-    if kind == "learning_samples":
-        given = {"source": rest[0], "seed": config["seeds"][0], "chunk": rest[1].removeprefix("chunk")}
-        settings = {"learning_curve": config["learning_curve"], "causes": config["causes"]} | icp
-        inputs = {"objects": f"objects/{rest[0]}.npz"}
-        return Recipe(
-            "gpca.steps.learning_curve:learning_samples", given | {"settings": settings}, inputs, {"samples": file}
-        )
-    seed = int(rest[-1].removeprefix("seed"))
-    if kind == "repairs":
-        from gpca.experiments.repair import own_settings
-
-        source = rest[1]
-        settings = own_settings(config, {}, config["diagnosis"]["reenactment"])
-        outputs = {"attempts": file, "timings": f"timings/{source}/repair_causes/seed{seed}.csv"}
-        inputs = {"objects": f"objects/{source}.npz", "causes": f"causes/{source}/seed{seed}.npz"}
-        return Recipe(
-            "gpca.steps.repair:attempt", {"source": source, "seed": seed, "settings": settings}, inputs, outputs
-        )
-    diagnosis, causes, controls = config["diagnosis"], config["causes"], config["controls"]
-    if kind in ("frame_causes", "frame_starts") or (kind == "reenactments" and rest[0] == REAL_WORLD):
-        settings = frame_settings | {"causes": causes} | icp
-        inputs = _splits("scenes", config) | {name: f"{name}/{REAL_WORLD}.npz" for name in ("instances", "objects")}
-        outputs = {"frame_causes": f"frame_causes/seed{seed}.npz", "starts": f"frame_starts/seed{seed}.npz"}
-        if kind == "reenactments":
-            step, more = "reenact_frames", {"reenactment": diagnosis["reenactment"] | frames["reenactment"]}
-            inputs, outputs = inputs | outputs, {"reenactments": f"reenactments/{REAL_WORLD}/seed{seed}.npz"}
-        else:
-            step, more = "frame_causes", {"frames": frames["causes"]}
-            outputs |= {"samples": f"frame_causes/seed{seed}.csv"}
-        given = {"source": REAL_WORLD, "seed": seed, **data, "settings": settings | more}
-        return Recipe(f"gpca.steps.frames:{step}", given, inputs, outputs)
-    source = rest[-2]
-    given = {"source": source, "seed": seed}
+    icp = {"icp": config["registrations"]["icp"]}
+    objects = {"objects": f"objects/{source}.npz"}
 
     def path(folder: str, suffix: str = "npz") -> str:
-        return f"{folder}/{source}/seed{seed}.{suffix}"
+        return f"{folder}/{source}/{name}.{suffix}"
 
     def timings(step: str) -> str:
-        return f"timings/{source}/{step}/seed{seed}.csv"
+        return f"timings/{source}/{step}/{name}.csv"
 
-    if kind in ("scan_causes", "scan_descriptors", "scan_reenactments"):
+    inputs = {"causes": path("causes"), "causes_timings": timings("causes")}
+    outputs = {kind: path(kind), "timings": timings(kind)}
+    if kind in ("objects", "instances"):
+        given |= {"surface_points": config["objects"]["surface_points"], **data}
+        if source == REAL_WORLD:
+            step, inputs = "gpca.steps.frames:instances", _splits("scenes", config)
+            settings = frame_settings | {"initial_pose": frames["initial_pose"]}
+            outputs = objects | {"instances": f"instances/{source}.npz"}
+        else:
+            step, inputs = "gpca.steps.pairs:objects", _splits("objects", config)
+            settings, outputs = config["sources"][source], {"out": objects["objects"]}
+    elif kind == "learning_samples":
+        step, inputs, outputs = "gpca.steps.learning_curve:learning_samples", objects, {"samples": file}
+        given |= {"seed": config["seeds"][0], "chunk": name.removeprefix("chunk")}
+        settings = {"learning_curve": config["learning_curve"], "causes": causes} | icp
+    elif kind == "repairs":
+        from gpca.experiments.repair import own_settings
+
+        step, inputs = "gpca.steps.repair:attempt", objects | {"causes": path("causes")}
+        outputs = {"attempts": file, "timings": timings("repair_causes")}
+        settings = own_settings(config, {}, diagnosis["reenactment"])
+    elif source == REAL_WORLD and kind in ("frame_causes", "frame_starts", "reenactments"):
+        given |= data
+        settings = frame_settings | {"causes": causes} | icp
+        inputs = _splits("scenes", config) | objects | {"instances": f"instances/{source}.npz"}
+        outputs = {"frame_causes": f"frame_causes/{name}.npz", "starts": f"frame_starts/{name}.npz"}
+        if kind == "reenactments":
+            step, inputs, outputs = "gpca.steps.frames:reenact_frames", inputs | outputs, {kind: path(kind)}
+            settings |= {"reenactment": diagnosis["reenactment"] | frames["reenactment"]}
+        else:
+            step, outputs = "gpca.steps.frames:frame_causes", outputs | {"samples": f"frame_causes/{name}.csv"}
+            settings |= {"frames": frames["causes"]}
+    elif kind in ("scan_causes", "scan_descriptors", "scan_reenactments"):
         from gpca.experiments.scan_causes import measurement_settings
         from gpca.scans.source import entry_of, place_of
 
-        place = place_of(entry_of(config["scans"]["datasets"][source]), config["data_dir"])
-        given |= {"settings": measurement_settings(config, source), "place": str(place or "")}
+        step, inputs, settings = "gpca.steps.scan_causes:measure", {}, measurement_settings(config, source)
+        given |= {"place": str(place_of(entry_of(config["scans"]["datasets"][source]), config["data_dir"]) or "")}
         outputs = {"scan_causes": path("scan_causes"), "samples": path("scan_causes", "csv")}
-        outputs |= {name: path(f"scan_{name}") for name in ("descriptors", "reenactments")}
-        return Recipe("gpca.steps.scan_causes:measure", given, {}, outputs)
-    step, inputs = "gpca.steps.causes:causes", {"causes": path("causes"), "causes_timings": timings("causes")}
-    outputs = {kind: path(kind), "timings": timings(kind)}
-    if kind in ("causes", HARD):
-        inputs = {"objects": f"objects/{source}.npz"}
-        settings = causes | (controls["hard"] if kind == HARD else {}) | icp
+        outputs |= {each: path(f"scan_{each}") for each in ("descriptors", "reenactments")}
+    elif kind in ("causes", HARD):
+        step, inputs = "gpca.steps.causes:causes", objects
         outputs = {"causes": path(kind), "candidates": path(kind, "csv"), "timings": timings(kind)}
+        settings = causes | (controls["hard"] if kind == HARD else {}) | icp
     elif kind == "descriptors":
         step, settings = "gpca.steps.causes:describe", diagnosis["descriptors"] | icp
     elif kind in ("reenactments", HARD_REENACTMENTS):
@@ -263,11 +254,11 @@ def recipe_of(file: str, config: Mapping[str, Any]) -> Recipe:
         outputs = {"weights": path("cause_encoders", "pt"), "curve": path("cause_encoders", "csv")}
         outputs |= {"embeddings": path("cause_embeddings"), "timings": timings("cause_embeddings")}
     elif kind == "control_embeddings":
-        encoder = config["encoders"][config["embedding"]["encoder"]]
-        controls = {name: value for name, value in controls.items() if name not in ("explainers", "hard")}
-        settings, given = {"controls": controls, "encoder": encoder}, given | {"control": HARD}
         step, inputs = "gpca.steps.control_samples:train", {"registrations": path(HARD)}
         outputs = {"embeddings": path(f"{kind}/{HARD}"), "curve": path(f"{kind}/{HARD}", "csv")}
+        sizes = {key: value for key, value in controls.items() if key not in ("explainers", "hard")}
+        given |= {"control": HARD}
+        settings = {"controls": sizes, "encoder": config["encoders"][config["embedding"]["encoder"]]}
     else:
         raise InputError(file, "is not a file of samples", "name one of a track")
     return Recipe(step, given | {"settings": settings}, inputs, outputs)

@@ -4,6 +4,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
@@ -78,10 +79,10 @@ class FewSamples(TrackSamples):
 
     @cached_property
     def config(self) -> dict[str, Any]:
-        """The config of the track's run with `FEW` samples, which need not be matched."""
-        hard = {key: value for key, value in self.whole["controls"]["hard"].items() if key != "matched"}
-        controls = {**self.whole["controls"], "hard": hard | FEW}
-        return {**self.whole, "causes": {**self.whole["causes"], **FEW}, "controls": controls}
+        """The config of the track's run with `FEW` samples, of `hard` as well, which need not be matched."""
+        controls, causes = self.whole["controls"], self.whole["causes"] | FEW
+        hard = {key: value for key, value in controls["hard"].items() if key not in (*FEW, "matched")}
+        return {**self.whole, "causes": causes, "controls": controls | {"hard": hard}}
 
     def parts(self) -> list[tuple[str, int, np.ndarray]]:
         """Return the only part."""
@@ -207,7 +208,7 @@ def _scans(trial: MethodTrial) -> list[PartPredictions]:
     samples, reads, parts = trial.samples, trial.entry.reads, trial.samples.parts()
     settings = diagnosis_settings(samples.config, {trial.name: [SCANS]}, {trial.name: trial.settings})
     folders = {"encoders": "cause_encoders"} if reads == EMBEDDINGS else {}
-    by_seed = {}
+    answers = {}
     for seed in dict.fromkeys(seed for _, seed, _ in parts):
         sets = [source for source, of, _ in parts if of == seed]
         kinds = ("scan_causes", "scan_descriptors", "scan_reenactments")
@@ -219,30 +220,25 @@ def _scans(trial: MethodTrial) -> list[PartPredictions]:
             started = perf_counter()
             diagnose_scans(job)
             seconds = perf_counter() - started
-            rows = read_predictions(path, labels=samples.track.labeled_by)
-        by_seed[seed] = rows, seconds / len(rows)
-    answers = []
-    for source, seed, _ in parts:
-        rows, seconds = by_seed[seed]
-        rows = rows[rows["scans"] == source]
-        calls = float(rows["icp_calls"].mean())
-        answers.append(PartPredictions(*predicted(rows, samples.track.labels), calls, seconds))
-    return answers
+            all_rows = read_predictions(path, labels=samples.track.labeled_by)
+        for source in sets:
+            rows = all_rows[all_rows["scans"] == source]
+            scores_and_names, calls = predicted(rows, samples.track.labels), float(rows["icp_calls"].mean())
+            answers[source, seed] = PartPredictions(*scores_and_names, calls, seconds / len(all_rows))
+    return [answers[source, seed] for source, seed, _ in parts]
 
 
 def _further(samples: TrackSamples) -> list[Path]:
     """Return the files of further training samples of all sources."""
-    chunks = range(len(read_settings(CurveSettings, samples.config["learning_curve"]).chunks()))
-    names = [f"learning_samples/{source}/chunk{chunk}.npz" for source in samples.config["sources"] for chunk in chunks]
-    return samples.files(names)
+    chunks = len(read_settings(CurveSettings, samples.config["learning_curve"]).chunks())
+    parts = product(samples.config["sources"], range(chunks))
+    return samples.files(f"learning_samples/{source}/chunk{chunk}.npz" for source, chunk in parts)
 
 
 def _training_files(samples: TrackSamples, folders: Mapping[str, str], seed: int) -> dict[str, list[Path]]:
     """Return the files of all sources of objects that a method learns from, by kind."""
-    return {
-        kind: samples.files(
-            f"{folder}/{source}/seed{seed}.{'pt' if kind == 'encoders' else 'npz'}"
-            for source in samples.config["sources"]
-        )
-        for kind, folder in folders.items()
-    }
+    files = {}
+    for kind, folder in folders.items():
+        name = f"seed{seed}.{'pt' if kind == 'encoders' else 'npz'}"
+        files[kind] = samples.files(f"{folder}/{source}/{name}" for source in samples.config["sources"])
+    return files

@@ -8,7 +8,7 @@ import pytest
 from baselines.gates import NominalThreshold
 from gpca.alignment.icp import ICPSettings
 from gpca.causes.dataset import HIDDEN, LABELS, labeled
-from gpca.causes.descriptors import COLUMNS, WIDTHS, describe_all
+from gpca.causes.descriptors import COLUMNS, EVERYTHING, WIDTHS, describe_all
 from gpca.causes.settings import GROUPS, DescriptorSettings
 from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.errors import InputError
@@ -80,7 +80,7 @@ def test_scores_are_over_the_labels_and_depend_on_nothing_but_what_the_entry_say
 def test_a_committee_says_the_mean_of_what_its_members_say(seen):
     from baselines.descriptors import Committee
 
-    committee = Committee(("pair", "motion", "runs", "remedies"), "four", 100)
+    committee = Committee(EVERYTHING, ("pair", "motion", "runs", "remedies"), "four", 100)
     committee.fit(seen)
     members = [member.explain(seen).scores_N_C for member in committee._members]
     assert committee.explain(seen).scores_N_C == pytest.approx(np.mean(members, axis=0))

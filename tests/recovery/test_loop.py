@@ -31,16 +31,16 @@ def blanked(episode):
 
 def test_no_truth_is_read_and_a_registration_is_re_enacted_once(start):
     episode, once = Episode(0, *start, LOOP.success), Reenactor(ReenactmentSettings(), CauseSettings(moved=OBSERVED))
-    seen, blind = (once.reenact(e) for e in (episode, blanked(episode)))
+    seen, blind = (once.reenact(e, ()) for e in (episode, blanked(episode)))
     assert seen.belief.failure == blind.belief.failure
     assert np.array_equal(seen.phi_3, blind.phi_3)
-    assert once.reenact(episode) is seen and seen.belief is once.believe(episode)
+    assert once.reenact(episode, ()) is seen and seen.belief is once.believe(episode, ())
 
 
 class Believing:
     """Takes every episode for failed with the probability that it has by itself."""
 
-    def believe(self, episode):
+    def believe(self, episode, _actions):
         return SimpleNamespace(failure=episode.failure)
 
 

@@ -13,8 +13,8 @@ from gpca.alignment.icp import require_cloud
 from gpca.errors import InputError
 from gpca.rigid import require_rigid, transform
 
-CORRESPONDENCE_DISTANCE = 0.10  # diameters, as in the protocol's ICP
-MAX_ITERATIONS = 50
+REACH = 0.10  # of correspondences, in diameters, as in the protocol's ICP
+ITERATIONS = 50
 FEWEST = 3  # correspondences that determine a rigid motion
 
 

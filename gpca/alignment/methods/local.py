@@ -15,14 +15,7 @@ import numpy as np
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.features import NEIGHBORS
 from gpca.alignment.icp import ICP, ICPSettings, Method
-from gpca.alignment.methods.interface import (
-    CORRESPONDENCE_DISTANCE,
-    MAX_ITERATIONS,
-    FailedRegistration,
-    MethodEntry,
-    Outcome,
-    Pair,
-)
+from gpca.alignment.methods.interface import ITERATIONS, REACH, FailedRegistration, MethodEntry, Outcome, Pair
 from gpca.process.environment import require_open3d
 from gpca.rigid import transform
 
@@ -43,9 +36,7 @@ def failure_of_a_step(pair: Pair, T_found: np.ndarray, T_further: np.ndarray, ma
     return f"has not converged in {max_iterations} iterations" if moving else ""
 
 
-def align_compiled(
-    pair: Pair, correspondence_distance: float = CORRESPONDENCE_DISTANCE, max_iterations: int = MAX_ITERATIONS
-) -> Outcome:
+def align_compiled(pair: Pair, correspondence_distance: float = REACH, max_iterations: int = ITERATIONS) -> Outcome:
     """Run the compiled loop, which ends at Open3D's poses (docs/protocol.md#two-loops-of-icp)."""
     icp = BatchedICP(pair.target, ICPSettings("point_to_point", correspondence_distance, max_iterations))
     (T,), (fitness,), (rmse,) = icp.register(pair.source, pair.T_target_source_init[None])
@@ -59,8 +50,8 @@ def align_by_open3d(
     method: Method,
     kernel: Kernel | None,
     pair: Pair,
-    correspondence_distance: float = CORRESPONDENCE_DISTANCE,
-    max_iterations: int = MAX_ITERATIONS,
+    correspondence_distance: float = REACH,
+    max_iterations: int = ITERATIONS,
 ) -> Outcome:
     """Run Open3D's loop, with a robust kernel of the distances to planes or none; planes have the target's normals."""
     normals = None if method == "point_to_point" else pair.normals("target")
@@ -79,7 +70,7 @@ def align_by_open3d(
 
 
 def align_by_small_gicp(
-    pair: Pair, correspondence_distance: float = CORRESPONDENCE_DISTANCE, max_iterations: int = MAX_ITERATIONS
+    pair: Pair, correspondence_distance: float = REACH, max_iterations: int = ITERATIONS
 ) -> Outcome:
     """Run generalized ICP of small_gicp (Koide 2024).
 

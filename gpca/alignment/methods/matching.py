@@ -9,14 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from gpca.alignment.features import MOST_NEIGHBORS, RADIUS, fpfh_of_pair
-from gpca.alignment.methods.interface import (
-    CORRESPONDENCE_DISTANCE,
-    FEWEST,
-    FailedRegistration,
-    MethodEntry,
-    Outcome,
-    Pair,
-)
+from gpca.alignment.methods.interface import FEWEST, REACH, FailedRegistration, MethodEntry, Outcome, Pair
 from gpca.alignment.methods.local import failure_of_a_step
 from gpca.process.environment import require_open3d
 from gpca.rigid import rigid_motion, transform
@@ -35,7 +28,7 @@ def align_by_ransac(
     feature_radius: float = RADIUS,
     inlier_distance: float = 0.05,
     iterations: int = 20_000,
-    correspondence_distance: float = CORRESPONDENCE_DISTANCE,
+    correspondence_distance: float = REACH,
     feature_neighbors: int = MOST_NEIGHBORS,
 ) -> Outcome:
     """Return the pose of three matches that agrees with most others (Fischler & Bolles 1981), all in diameters."""
@@ -64,7 +57,7 @@ def align_by_fgr(
     pair: Pair,
     feature_radius: float = RADIUS,
     inlier_distance: float = 0.05,
-    correspondence_distance: float = CORRESPONDENCE_DISTANCE,
+    correspondence_distance: float = REACH,
     feature_neighbors: int = MOST_NEIGHBORS,
 ) -> Outcome:
     """Minimize a robust cost of the scale `inlier_distance` over all matches in agreeing triples (Zhou et al. 2016)."""
@@ -89,9 +82,7 @@ def align_by_fgr(
     return Outcome.at(pair, T_target_source, correspondence_distance)
 
 
-def align_by_kiss_matcher(
-    pair: Pair, voxel: float = VOXEL, correspondence_distance: float = CORRESPONDENCE_DISTANCE
-) -> Outcome:
+def align_by_kiss_matcher(pair: Pair, voxel: float = VOXEL, correspondence_distance: float = REACH) -> Outcome:
     """Match both clouds (Lim et al. 2025), thinned to voxels in diameters, which also determine all radii."""
     package = _in_one_thread(import_module("kiss_matcher"))
     for name in ("source", "target"):
@@ -131,7 +122,7 @@ def align_by_drift(
     max_iterations: int = 100,
     tolerance: float = 1e-3,
     points: Annotated[int, Bounds(minimum=FEWEST)] = 512,
-    correspondence_distance: float = CORRESPONDENCE_DISTANCE,
+    correspondence_distance: float = REACH,
 ) -> Outcome:
     """Drift some points of the source onto the target at its scale (Myronenko & Song 2010), until it hardly changes."""
     random = generator("registration", "drift", pair.seed)

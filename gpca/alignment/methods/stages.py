@@ -8,15 +8,7 @@ from typing import Any, Literal, Self
 import numpy as np
 
 from gpca.alignment.icp import CONVERGED
-from gpca.alignment.methods.interface import (
-    CORRESPONDENCE_DISTANCE,
-    FEWEST,
-    MAX_ITERATIONS,
-    FailedRegistration,
-    MethodEntry,
-    Outcome,
-    Pair,
-)
+from gpca.alignment.methods.interface import FEWEST, ITERATIONS, REACH, FailedRegistration, MethodEntry, Outcome, Pair
 from gpca.alignment.methods.local import failure_of_a_step
 from gpca.rigid import best_motion, plane_step, rotate, transform
 from gpca.seeds import generator
@@ -123,8 +115,8 @@ def nearest(distance_n: np.ndarray, count: int) -> np.ndarray:
 def align_trimmed(
     pair: Pair,
     overlap: Share = 0.0,
-    correspondence_distance: float = CORRESPONDENCE_DISTANCE,
-    max_iterations: int = MAX_ITERATIONS,
+    correspondence_distance: float = REACH,
+    max_iterations: int = ITERATIONS,
 ) -> Outcome:
     """Align the share that fits best, or find it by ψ(ξ) = e / ξ^(1+λ), e the mean square (Chetverikov et al. 2002)."""
 
@@ -148,8 +140,8 @@ def align_variant(
     stage: str,
     change: Callable,
     pair: Pair,
-    correspondence_distance: float = CORRESPONDENCE_DISTANCE,
-    max_iterations: int = MAX_ITERATIONS,
+    correspondence_distance: float = REACH,
+    max_iterations: int = ITERATIONS,
 ) -> Outcome:
     """Run point-to-plane ICP with one stage changed; rows are drawn once per pair."""
     changed: dict[str, Any] = {stage: change(pair) if stage == "rows" else change}

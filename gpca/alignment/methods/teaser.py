@@ -3,14 +3,7 @@
 import numpy as np
 
 from gpca.alignment.features import MOST_NEIGHBORS, RADIUS, fpfh_of_pair, mutual_matches
-from gpca.alignment.methods.interface import (
-    CORRESPONDENCE_DISTANCE,
-    FEWEST,
-    FailedRegistration,
-    MethodEntry,
-    Outcome,
-    Pair,
-)
+from gpca.alignment.methods.interface import FEWEST, REACH, FailedRegistration, MethodEntry, Outcome, Pair
 from gpca.rigid import best_rotation, rigid_motion, rotate
 
 GROWTH = 1.4  # of the convexity parameter μ per iteration, as in the paper
@@ -120,7 +113,7 @@ def align(
     feature_radius: float = RADIUS,
     noise: float = 0.05,
     most_matches: int = 300,
-    correspondence_distance: float = CORRESPONDENCE_DISTANCE,
+    correspondence_distance: float = REACH,
     feature_neighbors: int = MOST_NEIGHBORS,
 ) -> Outcome:
     """Return the pose on which most matches agree; `noise`, in diameters, bounds a right match's error."""

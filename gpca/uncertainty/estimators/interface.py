@@ -13,7 +13,7 @@ import numpy as np
 
 from gpca.alignment.batched_icp import BatchedICP, BatchedPlaneICP
 from gpca.alignment.icp import ICPSettings
-from gpca.alignment.methods.interface import CORRESPONDENCE_DISTANCE, FEWEST, Outcome, Pair
+from gpca.alignment.methods.interface import FEWEST, REACH, Outcome, Pair
 from gpca.alignment.methods.registry import make_method, method_entry
 from gpca.objects.bop import symmetric_turn
 from gpca.pairs.distances import ObservedPair, describe_distances, describe_entropy
@@ -84,7 +84,7 @@ class RegisteredPair:
         """Return the correspondences at the pose; fewer than three are a failure."""
         moved_N_3 = transform(self.T_target_source, self.pair.source)
         distance_N, rows_N = self.pair.target_tree.query(moved_N_3)
-        near_N = distance_N < CORRESPONDENCE_DISTANCE
+        near_N = distance_N < REACH
         if near_N.sum() < FEWEST:
             raise FailedEstimate(f"fewer than {FEWEST} correspondences at the pose")
         rows_n, normals = rows_N[near_N], self.pair.target_normals

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 
 from gpca.alignment.batched_icp import make_target, pulls
-from gpca.alignment.methods.interface import CORRESPONDENCE_DISTANCE
+from gpca.alignment.methods.interface import REACH
 from gpca.rigid import exp, inverse, log
 from gpca.seeds import generator
 from gpca.uncertainty.estimators.interface import EstimatorEntry, RegisteredPair
@@ -27,7 +27,7 @@ class Posterior:
         self._precision = 1 / max(matches.variance, SMALLEST_VARIANCE)
         self.prior_precision_6 = registered.deviation_6**-2.0
         self.prior_6 = log((registered.pair.T_target_source_init @ inverse(self._T))[None])[0]
-        self._target = make_target(registered.pair.target, CORRESPONDENCE_DISTANCE)
+        self._target = make_target(registered.pair.target, REACH)
         curvature_6_6 = np.einsum("nik,nil->kl", matches.jacobians, matches.jacobians) * self._precision
         self.covariance = np.linalg.inv(curvature_6_6 + np.diag(self.prior_precision_6))
 
