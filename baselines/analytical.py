@@ -1,8 +1,4 @@
-"""Analytical features with GP-CA's classifier: what the learned embedding adds (the paper's ablation).
-
-Here a cropped cloud has fewer points than the others, so the point-count ratio gives the concept overlap away, unlike
-with a sensor. Hence two rows: `analytical_gpc` with the paper's list, `analytical_gpc_no_counts` without the ratio.
-"""
+"""Analytical features with GP-CA's classifier: what the learned embedding adds (docs/baselines.md)."""
 
 from functools import partial
 from typing import Annotated

@@ -1,10 +1,4 @@
-"""Explainers of causes on the descriptors of a pair, or on its re-enactment (docs/causes.md).
-
-Names that end in ``_clouds`` see the two clouds after ICP alone; ``trees_on_*`` and ``gpca_on_*`` measure the worth of
-each part, in the order of cost. ``alarm_*`` name no cause: ``alarm_entropies`` is CorAl (Adolfsson et al. 2021), a
-regression on the mean entropies of the clouds, joint and apart; ``alarm_features`` reads features like FACT's (Dillén,
-Forssén & Edstedt 2025), with boosted trees in place of its network.
-"""
+"""Explainers of causes on the descriptors of a pair, or on its re-enactment (docs/causes.md)."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -46,7 +40,7 @@ def described(registrations: Registrations, sees: Sees, wanted: Columns = EVERYT
     return seen({group: attached(registrations, group) for group in wanted}, sees, wanted)
 
 
-class DescriptorClassifier(interface.ClassifierExplainer):
+class Learner(interface.ClassifierExplainer):
     """Probabilities of an unfitted scikit-learn classifier on the `wanted` columns of the parts it sees."""
 
     labels = LABELS
@@ -59,10 +53,8 @@ class DescriptorClassifier(interface.ClassifierExplainer):
         return described(registrations, self._sees, self._wanted)
 
 
-def regression(
-    wanted: Columns, sees: Sees, source: str, seed: int, inverse_regularisation: Positive = 1.0
-) -> DescriptorClassifier:
-    return DescriptorClassifier(standardized_regression(inverse_regularisation), sees, wanted)
+def regression(wanted: Columns, sees: Sees, source: str, seed: int, inverse_regularisation: Positive = 1.0) -> Learner:
+    return Learner(standardized_regression(inverse_regularisation), sees, wanted)
 
 
 def randomized_trees(source: str, seed: int, trees: int = 300):
@@ -73,14 +65,14 @@ def randomized_trees(source: str, seed: int, trees: int = 300):
     return ExtraTreesClassifier(trees, min_samples_leaf=2, max_features=0.3, random_state=random_state)
 
 
-def forest(wanted: Columns, sees: Sees, source: str, seed: int, trees: Count = 300) -> DescriptorClassifier:
-    return DescriptorClassifier(randomized_trees(source, seed, trees), sees, wanted)
+def forest(wanted: Columns, sees: Sees, source: str, seed: int, trees: Count = 300) -> Learner:
+    return Learner(randomized_trees(source, seed, trees), sees, wanted)
 
 
 def boosting(
     sees: Sees, source: str, seed: int, iterations: Count = 150, learning_rate: LearningRate = 0.06
-) -> DescriptorClassifier:
-    return DescriptorClassifier(boosted_trees(source, seed, iterations=iterations, learning_rate=learning_rate), sees)
+) -> Learner:
+    return Learner(boosted_trees(source, seed, iterations=iterations, learning_rate=learning_rate), sees)
 
 
 class CausePairGPCA(DescriptorGPCA):
@@ -104,8 +96,8 @@ class Committee(interface.ScoringExplainer):
 
     def __init__(self, wanted: Columns, sees: Sees, source: str, seed: int) -> None:
         self._members: list[interface.ConceptExplainer] = [
-            DescriptorClassifier(randomized_trees(source, seed), sees, wanted),
-            DescriptorClassifier(boosted_trees(source, seed), sees, wanted),
+            Learner(randomized_trees(source, seed), sees, wanted),
+            Learner(boosted_trees(source, seed), sees, wanted),
             CausePairGPCA(wanted, sees, source, seed, learning_rate=0.1, iterations=200),
         ]
 
@@ -181,10 +173,12 @@ def even_scores(failure_N: np.ndarray) -> np.ndarray:
 
 
 def alarm_entropies(sees: Sees, source: str, seed: int, inverse_regularisation: Positive = 1.0) -> AlignmentClassifier:
+    """Return CorAl (Adolfsson et al. 2021), a regression on the mean entropies of the clouds, joint and apart."""
     return AlignmentClassifier(standardized_regression(inverse_regularisation), sees, {"entropy": JOINT_AND_APART})
 
 
 def alarm_features(sees: Sees, source: str, seed: int, iterations: Count = 150) -> AlignmentClassifier:
+    """Return boosted trees on features like FACT's (Dillén, Forssén & Edstedt 2025), in place of its network."""
     return AlignmentClassifier(boosted_trees(source, seed, "alignment", iterations=iterations), sees)
 
 
@@ -218,11 +212,10 @@ def _further(title: str, make: Callable[..., interface.ConceptExplainer]) -> Exp
 
 
 _reenacted = partial(ExplainerEntry, sees=REENACTMENT, reads=interface.REENACTED)
+_reenact_committee = partial(_committee, REENACTMENT)
 EXPLAINERS = {  # of the hard samples, all of which failed
     "reenact": _reenacted("Re-enactment (untrained)", partial(OfFailed, Reenact)),
-    "reenact_committee": _reenacted(
-        "Committee on the re-enactment", partial(OfFailed, partial(_committee, REENACTMENT))
-    ),
+    "reenact_committee": _reenacted("Committee on the re-enactment", partial(OfFailed, _reenact_committee)),
 }
 CAUSE_EXPLAINERS = {
     "alarm_entropies": entry("Aligned or not by entropies, CorAl", alarm_entropies, CLOUDS),
@@ -243,7 +236,7 @@ CAUSE_EXPLAINERS = {
     "pair_committee_clouds": entry(f"Committee on the pair, {WITHOUT}", _committee, CLOUDS),
     "reenact": _reenacted("Re-enactment (untrained)", Reenact),
     "result": _reenacted("Judge of the result, as gpca explain", Result),
-    "reenact_committee": _reenacted("Committee on the re-enactment", partial(_committee, REENACTMENT)),
+    "reenact_committee": _reenacted("Committee on the re-enactment", _reenact_committee),
 }
 for level, sight in LEVELS.items():
     words = interface.in_words(sight)

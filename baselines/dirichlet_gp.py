@@ -63,9 +63,7 @@ class DirichletGP(ScoringExplainer):
         normal_M_C = generator(*self._axes, "draws").normal(size=(self._draws, len(CONCEPTS)))
         return summarize_marginals(*self._posterior(registrations), normal_M_C)
 
-    def _gradient(
-        self, c: int, squared_N_N: np.ndarray, values_N: np.ndarray, noise_N: np.ndarray
-    ) -> tuple[float, float, float]:
+    def _gradient(self, c: int, squared_N_N: np.ndarray, values_N: np.ndarray, noise_N: np.ndarray) -> np.ndarray:
         """Return the gradient of the negative log marginal likelihood in log lengthscale, log scale and mean.
 
         For a parameter of the covariance, Σ (K⁻¹ - ααᵀ) ∂K / 2 with α = K⁻¹ (y - m) (Rasmussen & Williams 2006,
@@ -80,7 +78,7 @@ class DirichletGP(ScoringExplainer):
         inverse_N_N = lower_N_N + np.tril(lower_N_N, -1).T
         slope_N_N = 0.5 * (inverse_N_N - np.outer(alpha_N, alpha_N)) * K_N_N
         by_lengthscale = (slope_N_N * squared_N_N).sum() * np.exp(-2 * self._log_lengthscale_C[c].item())
-        return by_lengthscale, slope_N_N.sum(), -alpha_N.sum()
+        return np.array([by_lengthscale, slope_N_N.sum(), -alpha_N.sum()])
 
     def _factor(
         self, c: int, squared_N_N: np.ndarray, values_N: np.ndarray, noise_N: np.ndarray

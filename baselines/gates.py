@@ -85,7 +85,7 @@ def motion_alarm(registrations: Registrations, name: str) -> np.ndarray:
     return (-1 if name == "fitness" else 1) * attached(registrations, "motion")[:, MOTION.index(name)]
 
 
-class CovarianceGate(Alarm):
+class Covariance(Alarm):
     """The alarm is ln |Σ + εI| of the covariance that an untrained estimator gives at the result of ICP."""
 
     def __init__(self, estimator: str, source: str, seed: int, floor: Positive = 1e-12) -> None:
@@ -117,9 +117,7 @@ CAUSE_EXPLAINERS = {
     "gate_fitness": _by_motion("Fitness (gate)", partial(Gate, "fitness"), ("pair",)),
     "gate_spread": _by_motion("Spread of the runs (gate)", partial(Gate, "log_determinant"), ("runs",)),
     # In closed form (Censi 2007).
-    "gate_censi": ExplainerEntry("Covariance by Censi (gate)", partial(CovarianceGate, "censi"), ("pair",)),
+    "gate_censi": ExplainerEntry("Covariance by Censi (gate)", partial(Covariance, "censi"), ("pair",)),
     # Its sigma points are 12 further runs.
-    "gate_brossard": ExplainerEntry(
-        "Covariance by Brossard (gate)", partial(CovarianceGate, "brossard"), ("pair", "runs")
-    ),
+    "gate_brossard": ExplainerEntry("Covariance by Brossard (gate)", partial(Covariance, "brossard"), ("pair", "runs")),
 }

@@ -1,8 +1,4 @@
-"""Heads of a neural network on the embeddings, with deep learning's measures of uncertainty (paper, Table V).
-
-Draws of the logits give scores, variances and BALD like GP-CA's: members of a deep ensemble (Lakshminarayanan et al.
-2017), or passes of Monte-Carlo dropout (Gal & Ghahramani 2016).
-"""
+"""Heads of a neural network on the embeddings, with deep learning's measures of uncertainty (paper, Table V)."""
 
 import math
 from functools import partial
@@ -20,7 +16,7 @@ from gpca.seeds import generator, seed_of
 from gpca.settings import ArgumentsOf, Bounds, Count
 
 BATCH_SIZE = 64
-DropoutRate = Annotated[float, Bounds(minimum=0, exclusiveMaximum=1)]
+Rate = Annotated[float, Bounds(minimum=0, exclusiveMaximum=1)]
 
 
 class Heads:
@@ -30,7 +26,7 @@ class Heads:
         self,
         *axes: object,
         heads: int = 1,
-        rate: DropoutRate = 0.0,
+        rate: Rate = 0.0,
         hidden: int = 128,
         steps: int = 300,
         learning_rate: float = 2e-3,
@@ -89,13 +85,13 @@ class Heads:
         return inputs @ weight + bias
 
 
-HeadArguments = Annotated[Any, ArgumentsOf(Heads)]  # keyword arguments passed on to it
+HeadSettings = Annotated[Any, ArgumentsOf(Heads)]  # keyword arguments passed on to it
 
 
 class HeadLearner(ScoringExplainer):
     """Base of learners that draw logits from heads; `training` holds the settings of the heads."""
 
-    def __init__(self, source: str, seed: int, **training: HeadArguments) -> None:
+    def __init__(self, source: str, seed: int, **training: HeadSettings) -> None:
         self._axes = (source, seed, type(self).__name__)
         self._heads = Heads(*self._axes, **training)
 
@@ -112,9 +108,9 @@ class HeadLearner(ScoringExplainer):
 
 
 class Ensemble(HeadLearner):
-    """A deep ensemble of heads: each is a draw."""
+    """A deep ensemble of heads (Lakshminarayanan et al. 2017): each is a draw."""
 
-    def __init__(self, source: str, seed: int, members: Count = 5, **training: HeadArguments) -> None:
+    def __init__(self, source: str, seed: int, members: Count = 5, **training: HeadSettings) -> None:
         super().__init__(source, seed, heads=members, **training)
 
     def _draw_logits(self, h_N_d: np.ndarray) -> np.ndarray:
@@ -122,11 +118,9 @@ class Ensemble(HeadLearner):
 
 
 class Dropout(HeadLearner):
-    """Monte-Carlo dropout: every pass is a draw, its mask shared by all samples, like one network."""
+    """Monte-Carlo dropout (Gal & Ghahramani 2016): every pass is a draw, its mask shared by all samples."""
 
-    def __init__(
-        self, source: str, seed: int, rate: DropoutRate = 0.5, passes: Count = 100, **training: HeadArguments
-    ) -> None:
+    def __init__(self, source: str, seed: int, rate: Rate = 0.5, passes: Count = 100, **training: HeadSettings) -> None:
         super().__init__(source, seed, rate=rate, **training)
         self._rate, self._passes = rate, passes
 

@@ -1,8 +1,4 @@
-"""Explainers that see the pair, both clouds and perhaps the motion of ICP, instead of the aligned source alone.
-
-`gpca_pair` is the paper's classifier on :func:`gpca.pairs.distances.relations`, which do not depend on the object.
-`gpca_pair_clouds` does not read how far ICP moved the cloud, which gives pose errors away in the paper's protocol.
-"""
+"""Explainers that see the pair, both clouds and perhaps the motion of ICP, instead of the aligned source alone."""
 
 from functools import partial
 
@@ -52,7 +48,7 @@ class PairGPCA(PairDescription, DescriptorGPCA):
         DescriptorGPCA.__init__(self, (source, seed, "gpca_pair"), source, seed, **settings)
 
 
-class PairLearner(PairDescription, ClassifierExplainer):
+class PairModel(PairDescription, ClassifierExplainer):
     """Scores are the probabilities of a scikit-learn classifier on one group."""
 
     def __init__(self, classifier, *description) -> None:
@@ -60,20 +56,18 @@ class PairLearner(PairDescription, ClassifierExplainer):
         ClassifierExplainer.__init__(self, classifier)
 
 
-def pair_forest(source: str, seed: int, trees: Count = 200, points: DescribedPoints = 512) -> PairLearner:
+def pair_forest(source: str, seed: int, trees: Count = 200, points: DescribedPoints = 512) -> PairModel:
     """Make a forest on the 52 distances of the pair."""
     from sklearn.ensemble import RandomForestClassifier
 
     random_state = seed_of(source, seed, "pair_forest") % 2**32
     classifier = RandomForestClassifier(n_estimators=trees, random_state=random_state)
-    return PairLearner(classifier, source, seed, "distances", points)
+    return PairModel(classifier, source, seed, "distances", points)
 
 
-def density(
-    source: str, seed: int, inverse_regularisation: Positive = 1.0, points: DescribedPoints = 512
-) -> PairLearner:
+def density(source: str, seed: int, inverse_regularisation: Positive = 1.0, points: DescribedPoints = 512) -> PairModel:
     """Make a logistic regression on spacing and extent of the observed cloud."""
-    return PairLearner(standardized_regression(inverse_regularisation), source, seed, "densities", points)
+    return PairModel(standardized_regression(inverse_regularisation), source, seed, "densities", points)
 
 
 EXPLAINERS = {

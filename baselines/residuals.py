@@ -46,13 +46,11 @@ def residuals(registrations: Registrations) -> np.ndarray:
     return np.array([[log_residual(one, cKDTree(other)) for one, other in (pair, pair[::-1])] for pair in pairs])
 
 
-def residuals_logistic(
-    source: str, seed: int, inverse_regularisation: Positive = 1.0, floor: Positive = FLOOR
-) -> Residuals:
+def logistic(source: str, seed: int, inverse_regularisation: Positive = 1.0, floor: Positive = FLOOR) -> Residuals:
     return Residuals(standardized_regression(inverse_regularisation), floor)
 
 
-def residuals_forest(source: str, seed: int, trees: Count = 200, floor: Positive = FLOOR) -> Residuals:
+def forest(source: str, seed: int, trees: Count = 200, floor: Positive = FLOOR) -> Residuals:
     from sklearn.ensemble import RandomForestClassifier
 
     random_state = seed_of(source, seed, "residuals_forest") % 2**32
@@ -61,6 +59,6 @@ def residuals_forest(source: str, seed: int, trees: Count = 200, floor: Positive
 
 _entry = partial(ExplainerEntry, sees=("pair", "runs"), reads="uncertainty/removal", observed_only=True)
 EXPLAINERS = {
-    "residuals_logistic": _entry("Residuals (logistic regression)", residuals_logistic),
-    "residuals_forest": _entry("Residuals (random forest)", residuals_forest),
+    "residuals_logistic": _entry("Residuals (logistic regression)", logistic),
+    "residuals_forest": _entry("Residuals (random forest)", forest),
 }

@@ -1,8 +1,4 @@
-"""Sensitivity analysis of the registration's uncertainty: local derivatives, PRCC and Sobol indices.
-
-Local: one knob at a time, as in the paper. Global: partial rank correlation over a Latin hypercube (Marino et al. 2008)
-and total indices by Saltelli's scheme (Saltelli et al. 2010). Remedies are switched on one at a time.
-"""
+"""Sensitivity analysis of the registration's uncertainty: local, PRCC and Sobol indices (docs/baselines.md)."""
 
 from collections.abc import Callable
 from functools import partial
@@ -42,7 +38,7 @@ def partial_rank_correlations(inputs_K_3: np.ndarray, outputs_N_K: np.ndarray) -
 
 
 def total_indices(inputs_K_3: np.ndarray, outputs_N_K: np.ndarray) -> np.ndarray:
-    """Return Sobol's total index (N, 3) of each input for N outputs at Saltelli's K settings; zero if constant."""
+    """Return Sobol's total indices (N, 3) for N outputs at K settings (Saltelli et al. 2010); zero if constant."""
     from SALib.analyze import sobol
 
     problem = {"num_vars": 3, "names": ["noise", "spread", "overlap"], "bounds": [[0, 1]] * 3}
@@ -50,8 +46,7 @@ def total_indices(inputs_K_3: np.ndarray, outputs_N_K: np.ndarray) -> np.ndarray
     for values_3, output_K in zip(values_N_3, outputs_N_K, strict=True):
         if np.ptp(output_K) > 0:
             # Resamples only give confidence bounds, which are not used; two is the minimum.
-            indices = sobol.analyze(problem, output_K, calc_second_order=False, num_resamples=2, seed=0)
-            values_3[:] = indices["ST"]
+            values_3[:] = sobol.analyze(problem, output_K, calc_second_order=False, num_resamples=2, seed=0)["ST"]
     return values_N_3
 
 

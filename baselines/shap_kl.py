@@ -1,9 +1,4 @@
-"""SHAP over the registration's uncertainty (Lundberg & Lee 2017; Qin et al. 2024), under four protocols.
-
-The worth of a coalition of the concepts is the uncertainty with those present; that of the largest Shapley value is
-named. The protocols differ in what a feature is (docs/baselines.md): a knob turned on the observed pair (additive, the
-paper's), the true perturbation of a clean pair (oracle), or a remedy (removal; supervised: with labels).
-"""
+"""SHAP (Lundberg & Lee 2017) over the registration's uncertainty, under four protocols (docs/baselines.md)."""
 
 from functools import partial
 

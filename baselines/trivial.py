@@ -1,8 +1,4 @@
-"""Trivial opponents: what a few numbers of a registration give away, with thresholds or weights fitted in training.
-
-A method's gain is its lead over the best of these, those of :mod:`baselines.untrained` and `density`. None looks at
-where the clouds differ. `hypotheses` puts thresholds on the best hypothesis of a re-enactment's search.
-"""
+"""Trivial opponents: a few numbers of a registration with thresholds or weights fitted in training."""
 
 from collections.abc import Callable
 from functools import partial
@@ -37,7 +33,7 @@ class TrivialNumbers:
 
 
 class TrivialClassifier(TrivialNumbers, ClassifierExplainer):
-    """A scikit-learn classifier on the ten trivial numbers."""
+    """A scikit-learn trivial on the ten trivial numbers."""
 
 
 class FittedRule(TrivialNumbers, Rule):
@@ -89,14 +85,12 @@ def logistic(explainer: Callable, source: str, seed: int, inverse_regularisation
 
 
 def _entries(of: Callable[[type], type], rule: ExplainerEntry) -> dict[str, ExplainerEntry]:
-    classifier = of(TrivialClassifier)
+    trivial = of(TrivialClassifier)
     return {
         "rule_fitted": rule,
-        "tree_trivial": ExplainerEntry(
-            "Tree of depth 3 on ten trivial numbers", partial(tree, classifier), WITH_MOTION
-        ),
+        "tree_trivial": ExplainerEntry("Tree of depth 3 on ten trivial numbers", partial(tree, trivial), WITH_MOTION),
         "logistic_trivial": ExplainerEntry(
-            "Logistic regression on ten trivial numbers", partial(logistic, classifier), WITH_MOTION
+            "Logistic regression on ten trivial numbers", partial(logistic, trivial), WITH_MOTION
         ),
         "hypotheses": ExplainerEntry(
             "Hypotheses with thresholds, not enacted",

@@ -56,9 +56,7 @@ def add_common_arguments(command: ArgumentParser) -> None:
 
 def _run(arguments: list[str], chosen: str | None) -> int:
     program = "gpca" if Path(sys.argv[0]).stem == "gpca" else "python -m gpca"
-    parser = OneLineParser(
-        prog=program, description="Commands to run by hand; the steps of the workflow are its targets."
-    )
+    parser = OneLineParser(prog=program, description="Commands to run by hand; the workflow's steps are its targets.")
     parser.add_argument("--version", action="version", version=f"gpca {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="command")
     for name, summary in COMMANDS.items():

@@ -244,8 +244,7 @@ def _input_error(fault: ErrorDetails, path: list[str | int], adapter: TypeAdapte
         names = list(_keys_at(adapter.json_schema(), path[:-1]))
         close = get_close_matches(str(path[-1]), names, n=1)
         others = f"choose one of {', '.join(names)}" if names else "leave it out"
-        remedy = f"did you mean {close[0]}?" if close else others
-        return InputError(f"{subject} {key}", "unknown", remedy)
+        return InputError(f"{subject} {key}", "unknown", f"did you mean {close[0]}?" if close else others)
     if fault["type"] == "missing" and isinstance(path[-1], int):
         return InputError(f"{subject} {'.'.join(map(str, path[:-1]))}", f"{value} is too short")
     if fault["type"] == "missing":

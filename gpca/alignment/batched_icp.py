@@ -12,6 +12,7 @@ from gpca.alignment.icp import CONVERGED, ICPSettings, require_cloud
 from gpca.alignment.icp_kernels import LISTED, align_all, plane_all, pull_all
 from gpca.rigid import rigid_motion
 
+Arrays = tuple[np.ndarray, ...]
 MOST_LISTS = 1 << 16  # beyond that, queries in new voxels search the cells
 NO_NORMALS = np.empty((0, 3))
 SINGULAR = 1e-10  # eigenvalue, relative to the largest, below which a step leaves its direction alone
@@ -74,12 +75,10 @@ class BatchedICP:
         self._iterations = settings.max_iterations
         self._target = make_target(target, settings.correspondence_distance)
 
-    def register(
-        self, source: np.ndarray, T_target_source_init_n: np.ndarray, max_iterations: int | None = None
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def register(self, source: np.ndarray, T_init_n: np.ndarray, max_iterations: int | None = None) -> Arrays:
         """Align `source` (N, 3) from poses (n, 4, 4): poses, fitness, inlier RMSE (n,); 0 iterations only measure."""
         require_cloud("source cloud", source)
-        poses_n = np.array(T_target_source_init_n, np.float64)
+        poses_n = np.array(T_init_n, np.float64)
         fitness_n, rmse_n = np.empty(len(poses_n)), np.empty(len(poses_n))
         source = np.ascontiguousarray(source, np.float64)
         iterations = self._iterations if max_iterations is None else max_iterations
@@ -87,17 +86,15 @@ class BatchedICP:
         return poses_n, fitness_n, rmse_n
 
 
-def pulls(
-    target: Target, source: np.ndarray, T_target_source_n: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def pulls(target: Target, source: np.ndarray, poses_n: np.ndarray) -> Arrays:
     """Return the mean of [y × r, r] (n, 6) over correspondences of `source` (N, 3), fitness (n,) and RMSE (n,).
 
     r = y - q is the offset of the moved point y from its neighbor q, and the mean half the gradient of that of |r|².
     """
-    n = len(T_target_source_n)
+    n = len(poses_n)
     pulls_n_6, fitness_n, rmse_n = np.empty((n, 6)), np.empty(n), np.empty(n)
     source = np.ascontiguousarray(source, np.float64)
-    pull_all(source, target, np.ascontiguousarray(T_target_source_n), pulls_n_6, fitness_n, rmse_n)
+    pull_all(source, target, np.ascontiguousarray(poses_n), pulls_n_6, fitness_n, rmse_n)
     return pulls_n_6, fitness_n, rmse_n
 
 
@@ -114,20 +111,16 @@ class BatchedPlaneICP:
         self._normals = np.ascontiguousarray(target_normals[rows_P], np.float64)
         self.iterations = settings.max_iterations
 
-    def register(
-        self, source: np.ndarray, T_target_source_init_n: np.ndarray, max_iterations: int | None = None
-    ) -> tuple[np.ndarray, ...]:
+    def register(self, source: np.ndarray, T_init_n: np.ndarray, max_iterations: int | None = None) -> Arrays:
         """Align `source` (N, 3) from n initial poses (n, 4, 4), as :meth:`BatchedICP.register`."""
         require_cloud("source cloud", source)
         normals = np.ascontiguousarray(estimate_normals(source)) if self._generalized else NO_NORMALS
         source = np.ascontiguousarray(source, np.float64)
-        poses_n = np.array(T_target_source_init_n, np.float64)
+        poses_n = np.array(T_init_n, np.float64)
         iterations = self.iterations if max_iterations is None else max_iterations
         return _descend(lambda rows_m: self.sums(source, poses_n[rows_m], normals), poses_n, iterations)
 
-    def sums(
-        self, source: np.ndarray, poses_n: np.ndarray, source_normals: np.ndarray = NO_NORMALS
-    ) -> tuple[np.ndarray, ...]:
+    def sums(self, source: np.ndarray, poses_n: np.ndarray, source_normals: np.ndarray = NO_NORMALS) -> Arrays:
         """Return Σ JᵀJ (n, 6, 6) and Σ Jᵀd (n, 6) of the plane distances d, fitness (n,) and inlier RMSE (n,)."""
         n = len(poses_n)
         sums = np.empty((n, 6, 6)), np.empty((n, 6)), np.empty(n), np.empty(n)
@@ -145,23 +138,19 @@ def icp_to(target: np.ndarray, settings: ICPSettings) -> AnyICP:
     return BatchedPlaneICP(target, None, settings)
 
 
-def register_each_to_planes(
-    icps: Sequence[BatchedPlaneICP], sources: Sequence[np.ndarray], T_target_source_init_n: np.ndarray
-) -> tuple[np.ndarray, ...]:
+def register_each(icps: Sequence[BatchedPlaneICP], sources: Sequence[np.ndarray], T_init_n: np.ndarray) -> Arrays:
     """Align n sources, each (N, 3), to n targets from one pose each, in lockstep; see :meth:`BatchedICP.register`."""
     sources = [np.ascontiguousarray(source, np.float64) for source in sources]
-    poses_n = np.array(T_target_source_init_n, np.float64)
+    poses_n = np.array(T_init_n, np.float64)
 
-    def sums(rows_m: np.ndarray) -> tuple[np.ndarray, ...]:
+    def sums(rows_m: np.ndarray) -> Arrays:
         each = [icps[row].sums(sources[row], poses_n[row : row + 1]) for row in rows_m]
         return tuple(np.concatenate(parts) for parts in zip(*each, strict=True))
 
     return _descend(sums, poses_n, icps[0].iterations)
 
 
-def _descend(
-    sums: Callable[[np.ndarray], tuple[np.ndarray, ...]], poses_n: np.ndarray, iterations: int
-) -> tuple[np.ndarray, ...]:
+def _descend(sums: Callable[[np.ndarray], Arrays], poses_n: np.ndarray, iterations: int) -> Arrays:
     """Move the poses (n, 4, 4) in place until they converge; `sums` returns the sums at the given rows (m,)."""
     hessian_n, gradient_n, fitness_n, rmse_n = sums(np.arange(len(poses_n)))
     active = np.flatnonzero(fitness_n > 0)

@@ -16,8 +16,7 @@ def estimate_normals(points_N_3: np.ndarray, neighbors: int = NEIGHBORS) -> np.n
     cloud = open3d_cloud(points_N_3)
     cloud.estimate_normals(require_open3d().geometry.KDTreeSearchParamKNN(neighbors))
     normals_N_3 = np.array(cloud.normals)
-    outward_N_3 = points_N_3 - points_N_3.mean(axis=0)
-    inward_N = np.einsum("ni,ni->n", normals_N_3, outward_N_3) < 0
+    inward_N = np.einsum("ni,ni->n", normals_N_3, points_N_3 - points_N_3.mean(axis=0)) < 0
     return np.where(inward_N[:, None], -normals_N_3, normals_N_3)
 
 

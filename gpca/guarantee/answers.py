@@ -147,18 +147,16 @@ def answers_of(scored: Scored, condition: Condition, settings: GuaranteeSettings
             tested_N = model_N & condition.tested & (family_N == family)
             calibration_N = model_N & condition.calibration & (family_N != family)
             samples, families = (probabilities_N_5[calibration_N], scored.state[calibration_N]), family_N[calibration_N]
-            further: dict[str, dict] = {
+            ways: dict[str, dict] = {
                 BY_SAMPLE: {},
                 BY_STATE: {"by_state": True},
                 BY_FAMILY: {"family_N": families} | risks,
             }
-            guarantees = {
-                name: calibrate(*samples, **limits | further[name]) for name in further if name in condition.variants
-            }
+            made = {name: calibrate(*samples, **limits | ways[name]) for name in ways if name in condition.variants}
             tested_n_5 = probabilities_N_5[tested_N]
             failure_n = 1 - tested_n_5[:, 0]
-            sets.append({name: each.sets(tested_n_5) for name, each in guarantees.items()})
-            calls.append({name: each.alarm(failure_n) for name, each in guarantees.items() if name in WITH_ALARM})
+            sets.append({name: each.sets(tested_n_5) for name, each in made.items()})
+            calls.append({name: each.alarm(failure_n) for name, each in made.items() if name in WITH_ALARM})
             if PLAIN in condition.variants:
                 sets[-1][PLAIN] = plain_sets(tested_n_5, settings.level)
                 failures = 1 - probabilities_N_5[failed_N, 0]

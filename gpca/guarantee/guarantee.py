@@ -108,8 +108,7 @@ def calibrate(
     family_n = None if family_N is None else np.asarray(family_N)[clear_N]
     scores_n_K, state_n = np.asarray(scores_N_K, float)[clear_N], state_N[clear_N]
     sets = conformal.calibrate_sets(scores_n_K, state_n, family_n, states, level, by_state)
-    failed_n = state_n != states[0]
-    alarm = conformal.calibrate_alarm(1 - scores_n_K[:, 0], failed_n, family_n, missed, false_alarms)
+    alarm = conformal.calibrate_alarm(1 - scores_n_K[:, 0], state_n != states[0], family_n, missed, false_alarms)
     return Guarantee(sets, alarm, len(state_n), 0 if family_n is None else len(np.unique(family_n)))
 
 

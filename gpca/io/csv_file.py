@@ -22,11 +22,10 @@ if TYPE_CHECKING:
 _CONTROL = r"[\x00-\x08\x0a-\x1f\x7f]"  # all but tabs
 NAMES = ("object", "cluster", "method", "explainer", "policy")  # columns of names, which must not be empty
 ANY = ("*",)
+Texts = Iterable[str]
 
 
-def read_csv(
-    path: str | Path, columns: Iterable[str], others: Iterable[str] = (), remedy: str = "regenerate it"
-) -> pd.DataFrame:
+def read_csv(path: str | Path, columns: Texts, others: Texts = (), remedy: str = "regenerate it") -> pd.DataFrame:
     """Read a CSV file as text, with the required columns and patterns of others; InputError for a damaged one."""
     require_file(path, "no such file", "make it with snakemake")
     import pandas as pd
@@ -77,11 +76,7 @@ def numbers(path: str | Path, rows: pd.DataFrame, column: str, needed=True, leas
 
 
 def read_numbers(
-    path: str | Path,
-    columns: Iterable[str],
-    numeric: Iterable[str],
-    optional: Iterable[str] = (),
-    others: Iterable[str] = (),
+    path: str | Path, columns: Texts, numeric: Texts, optional: Texts = (), others: Texts = ()
 ) -> pd.DataFrame:
     """Read a CSV file as :func:`read_csv` does, with numeric columns as numbers; empty optional entries become NaN."""
     rows, may_be_empty = read_csv(path, columns, others), set(optional)

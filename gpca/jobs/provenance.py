@@ -29,16 +29,13 @@ _FIELDS: Mapping[str, type] = {
     **dict.fromkeys(("code", "config_sha256", "device", "libraries"), dict),
     **dict.fromkeys(("environment_lock_sha256", "python"), str),
 }
+Paths = Sequence[Path | str]
 CONFIG_VARIABLE = "GPCA_CONFIG_SHA256"  # hash of each section, JSON, for jobs
 
 
 @contextmanager
 def record_provenance(
-    outputs: Sequence[Path | str],
-    inputs: Sequence[Path | str],
-    settings: Mapping,
-    seed: int | None = None,
-    folders: bool = False,
+    outputs: Paths, inputs: Paths, settings: Mapping, seed: int | None = None, folders: bool = False
 ) -> Iterator[dict]:
     """Time the block, which may add to the record, and write ``<output>.provenance.json`` beside each output."""
     require_outputs(outputs, inputs, folders)

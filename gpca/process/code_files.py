@@ -39,9 +39,7 @@ def code_files(*modules: str) -> list[str]:
             reached[module], imported = _imports(module)
             open_modules += imported
     files = {*reached.values()}
-    files |= {
-        str(file) for module in BESIDE.keys() & reached for file in Path(reached[module]).parent.glob(BESIDE[module])
-    }
+    files |= {str(file) for name in BESIDE.keys() & reached for file in Path(reached[name]).parent.glob(BESIDE[name])}
     working = Path.cwd().resolve()  # as ROOT is
     seen = str(ROOT.relative_to(working) / "_")[:-1] if ROOT.is_relative_to(working) else f"{ROOT}/"
     prefixes = {f"{ROOT}/": seen, f"{working}/": ""}  # where files are -> what their names begin with

@@ -23,6 +23,7 @@ LOOSER = 2.0  # correspondence distance of the broader search, relative to ICP's
 JUDGED = 8  # number of results of the search that are compared with the shots
 MODEL_POINTS, CLOUD_POINTS = 512, 256
 BEHIND = (0.1, 0.25)  # tried distances of the object's center behind the middle of the measured side, in diameters
+AROUND_DEG = (20.0, 45.0, 70.0)  # elevations of the viewpoints around a table
 OBSERVED = (
     *("fitness", "inlier_rmse", "to_model_median", "to_model_high", "to_observed_median", "to_observed_high"),
     *("thickness", "on_model", "explained", "hidden", "log_points", "rotation_rad", "translation", "shots", "filtered"),
@@ -74,17 +75,16 @@ class Holding:
 
 
 Action = Callable[..., Holding]
+Random = np.random.Generator
 
 
-def reinitialize(
-    holding: Holding, robot: Robot, random: np.random.Generator, starts: int = 64, posterior: bool = False
-) -> Holding:
+def reinitialize(holding: Holding, robot: Robot, random: Random, starts: int = 64, posterior: bool = False) -> Holding:
     """Search all orientations by ICP with a larger reach, perhaps with probable poses; start from the best result."""
     poses = search(holding, robot, random, starts)
     return best_start(holding, robot, [*poses, *(probable(holding, robot, random) if posterior else ())])
 
 
-def probable(holding: Holding, robot: Robot, random: np.random.Generator) -> list[np.ndarray]:
+def probable(holding: Holding, robot: Robot, random: Random) -> list[np.ndarray]:
     """Return the probable poses of what was measured, whatever its initial pose; none for few points."""
     from gpca.alignment.methods.interface import Pair
     from gpca.reenactment.registration import pose_posterior
@@ -101,7 +101,7 @@ def probable(holding: Holding, robot: Robot, random: np.random.Generator) -> lis
     return [inverse(scale_translation(T, d)) for T in poses]
 
 
-def search(holding: Holding, robot: Robot, random: np.random.Generator, starts: int) -> list[np.ndarray]:
+def search(holding: Holding, robot: Robot, random: Random, starts: int) -> list[np.ndarray]:
     """Return the `JUDGED` best results of ICP with a larger reach from random orientations; none for few points."""
     from scipy.spatial.transform import Rotation
 
@@ -113,8 +113,7 @@ def search(holding: Holding, robot: Robot, random: np.random.Generator, starts: 
     if len(cloud_m) < 3:
         return []
     thinned_m = cloud_m[random.permutation(len(cloud_m))[:CLOUD_POINTS]]
-    rows = random.permutation(len(robot.points_m))[:MODEL_POINTS]
-    model_m = robot.points_m[rows].astype(np.float64)
+    model_m = robot.points_m[random.permutation(len(robot.points_m))[:MODEL_POINTS]].astype(np.float64)
     settings = ICPSettings()
     icp = BatchedICP(model_m / d, replace(settings, correspondence_distance=LOOSER * settings.correspondence_distance))
     away = cloud_m.mean(axis=0) - holding.shots[0].T_world_camera[:3, 3]
@@ -129,11 +128,7 @@ def search(holding: Holding, robot: Robot, random: np.random.Generator, starts: 
 
 
 def new_view(
-    holding: Holding,
-    robot: Robot,
-    random: np.random.Generator,
-    azimuths: int = 8,
-    elevations_deg: tuple[float, ...] = (20.0, 45.0, 70.0),
+    holding: Holding, robot: Robot, random: Random, azimuths: int = 8, elevations_deg: tuple[float, ...] = AROUND_DEG
 ) -> Holding:
     """Move to the viewpoint that should show most of the unseen surface, and fuse its shot."""
     from gpca.frames.shots import best_viewpoint
@@ -145,11 +140,7 @@ def new_view(
 
 
 def look_around(
-    holding: Holding,
-    robot: Robot,
-    random: np.random.Generator,
-    azimuths: int = 8,
-    elevations_deg: Sequence[float] = (20.0, 45.0, 70.0),
+    holding: Holding, robot: Robot, random: Random, azimuths: int = 8, elevations_deg: Sequence[float] = AROUND_DEG
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return viewpoints (n, 4, 4) around the measured points, and which model points were and would be seen."""
     from gpca.frames.shots import candidates, expected_surface
@@ -164,7 +155,7 @@ def look_around(
     return poses_n, *expected_surface(holding.shots, *shape, *pose, poses_n, coarse(first.camera))
 
 
-def denoise(holding: Holding, robot: Robot, random: np.random.Generator, frames: int = 10) -> Holding:
+def denoise(holding: Holding, robot: Robot, random: Random, frames: int = 10) -> Holding:
     """From now on, take the median of several frames at every viewpoint and remove statistical outliers."""
     if holding.filtered:  # a repeated action adds frames to the earlier ones
         frames += holding.frames
@@ -191,7 +182,7 @@ def action_of(name: str, settings: Mapping[str, object]) -> Action:
     return partial(ACTIONS[name], **settings)
 
 
-def observe(holding: Holding, record: dict, robot: Robot, random: np.random.Generator) -> np.ndarray:
+def observe(holding: Holding, record: dict, robot: Robot, random: Random) -> np.ndarray:
     """Return the numbers `OBSERVED` of a registration; lengths are in diameters.
 
     Distances after ICP are median and 90th percentile; thickness is the measured cloud's, by local planes; on_model,
@@ -230,9 +221,7 @@ def observe(holding: Holding, record: dict, robot: Robot, random: np.random.Gene
     )
 
 
-def _agreements(
-    holding: Holding, robot: Robot, cloud_m: np.ndarray, poses: Sequence[np.ndarray]
-) -> list[tuple[float, float, float]]:
+def _agreements(holding: Holding, robot: Robot, cloud_m: np.ndarray, poses: Sequence[np.ndarray]) -> list[tuple]:
     points_m = _thinned(cloud_m, CLOUD_POINTS)
     model_m, normals = (_thinned(each, MODEL_POINTS).astype(np.float64) for each in (robot.points_m, robot.normals))
     return [agreement(holding.shots, points_m, model_m, normals, T, robot.diameter_m) for T in poses]

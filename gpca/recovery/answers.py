@@ -115,8 +115,7 @@ def learn_explainers(
         started = perf_counter()
         attribution = answer_of(explainer, attach(given))
         # All get the same, as the encoder sees many at once; the explainer's own seconds hold what remedies took too.
-        each = (perf_counter() - started) / len(given)
-        return replace(attribution, seconds_N=np.full(len(given), each))
+        return replace(attribution, seconds_N=np.full(len(given), (perf_counter() - started) / len(given)))
 
     explain: dict[str, Explain] = {}
     for name in names:

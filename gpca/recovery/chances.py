@@ -33,9 +33,7 @@ class FailureGate:
         return bool(self.failure(observed_F[None])[0] > self.threshold)
 
 
-def learn_gate(
-    observed_N_F: np.ndarray, failed_N: np.ndarray, table_N: Sequence[object], false_alarms: float
-) -> FailureGate:
+def learn_gate(observed_N_F: np.ndarray, failed_N: np.ndarray, table_N: Sequence, false_alarms: float) -> FailureGate:
     """Train a gate; its threshold is set on good registrations, each judged by a classifier without their table."""
     good_N = ~failed_N
     _, group_N = np.unique([str(table) for table in table_N], return_inverse=True)

@@ -137,9 +137,7 @@ def calibrated_alarm(episodes: Iterable[Episode], reenactor: Reenactor, false_al
     if not good:
         fault = "has no good registration by which the alarm of the re-enactment can be set"
         raise InputError("recovery", fault, "raise recovery.calibration or recovery.rehearsals")
-    failures = [
-        reenactor.believe(episode, ()).failure for episode in progress(good, "good registrations for the alarm")
-    ]
+    failures = [reenactor.believe(each, ()).failure for each in progress(good, "good registrations for the alarm")]
     return alarm_threshold(np.array(failures), false_alarms)
 
 

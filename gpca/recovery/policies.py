@@ -63,8 +63,7 @@ def follow_scores(case: Case, means: Means) -> Decision:
     before = []
     for step, action in enumerate(case.actions):
         column = CONCEPTS.index(concept_of[action])
-        fall = scores_T_C[step, column] - scores_T_C[step + 1, column]
-        before.append(Treated(concept_of[action], float(fall)))
+        before.append(Treated(concept_of[action], float(scores_T_C[step, column] - scores_T_C[step + 1, column])))
     return means.policy.decide(scores_T_C[-1], float(bald_T[-1]), before)
 
 

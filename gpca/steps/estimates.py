@@ -96,7 +96,7 @@ def draw_twists(kind: Kind, registered: RegisteredPair, redraws: Redraws, repeat
 
 def _register_each(method: str, clouds: Clouds, starts_n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Poses of other clouds registered from each start (n, 4, 4), and which found a correspondence (n,)."""
-    from gpca.alignment.batched_icp import BatchedICP, BatchedPlaneICP, register_each_to_planes
+    from gpca.alignment.batched_icp import BatchedICP, BatchedPlaneICP, register_each
     from gpca.alignment.features import estimate_normals
 
     parts = []
@@ -105,7 +105,7 @@ def _register_each(method: str, clouds: Clouds, starts_n: np.ndarray) -> tuple[n
             starts_k = starts_n[at : at + AT_ONCE]
             pairs = list(islice(clouds, len(starts_k)))
             icps = [BatchedPlaneICP(target, estimate_normals(target), SETTINGS) for _, target in pairs]
-            parts.append(register_each_to_planes(icps, [source for source, _ in pairs], starts_k)[:2])
+            parts.append(register_each(icps, [source for source, _ in pairs], starts_k)[:2])
     elif method == POINT_TO_POINT:
         for start, (source, target) in zip(starts_n, clouds, strict=False):  # the clouds are without end
             parts.append(BatchedICP(target, SETTINGS).register(source, start[None])[:2])

@@ -31,20 +31,15 @@ OURS = {"authors": "this repository"}
 HEAD_COLUMNS = ("authors", "seconds", "hardware")  # from the heads of submissions
 MARK = "→ "  # before the title of a submitted method
 POINTS = ("auroc_failed", "auroc_error", "nominal_calibration")  # measures that are not printed in %
+OF_CAUSES = ("tied_accuracy", "regret", "auroc_failed")
 COLUMNS: Mapping[str, Mapping[str, Column]] = {
-    CAUSES_TRACK: {
-        name: SHOWN[name]
-        for name in ("balanced_accuracy", "dominant_accuracy", "tied_accuracy", "regret", "auroc_failed")
-    },
+    CAUSES_TRACK: {name: SHOWN[name] for name in ("balanced_accuracy", "dominant_accuracy", *OF_CAUSES)},
     HARD_TRACK: {
         "accuracy": Column("Accuracy (%), chance 33.3"),
         **{f"recall_{concept}": Column(f"Of {concept} (%)", interval=False) for concept in CONCEPTS},
         "auroc_error": Column("AUROC of errors", 2, False, (0.0, 1.0)),
     },
-    FRAMES_TRACK: {
-        STATE: Column("State (%)"),
-        **{name: SHOWN[name] for name in ("tied_accuracy", "regret", "auroc_failed")},
-    },
+    FRAMES_TRACK: {STATE: Column("State (%)"), **{name: SHOWN[name] for name in OF_CAUSES}},
     SCANS_TRACK: {name: column for name, column in SCAN_COLUMNS.items() if name not in NOT_COMPARED},
 }
 GROUPS = {**STARTS, POOLED: "All together"}  # titles; data sets keep their names
@@ -88,11 +83,10 @@ def table_of(published: Published, submitted: Mapping[str, Method], scores: Fram
                 words = ", ".join(f"{count} {state}" for state, count in states.items())
                 labels.insert(0, (group, f"{GROUPS.get(group, group)} ({words}{few})"))
             table.add_row(labels, cells, rival=name != CEILING and not few)
+    unit, decimals = ("", 3) if factor == 1 else (" (points)", 1)
     for name in submitted:
-        title, limits = f"Minus {methods[name].title}", (-float(factor), float(factor))
-        columns[f"minus {name}"] = (
-            Column(title, 3, limits=limits) if factor == 1 else Column(f"{title} (points)", limits=limits)
-        )
+        title, limits = f"Minus {methods[name].title}{unit}", (-float(factor), float(factor))
+        columns[f"minus {name}"] = Column(title, decimals, limits=limits)
     columns |= {"icp_calls": SHOWN["icp_calls"], "samples": SHOWN["samples"]}
     table.compare_down(COLUMNS[track.name], same=len(heads))
     return table.build(
@@ -179,10 +173,7 @@ def boards(submissions: Mapping[str, Sequence[Submission]]) -> list[dict[str, An
     links = {each.method.name: each.head["link"] for _, sent in tracks for each in sent if each.head["link"] != NO_LINK}
     methods = [(of, {each.method.name: each.method for each in sent}) for of, sent in tracks]
     together, costs = overall(methods, links)
-    return [
-        together,
-        *(board_of(*track, links) | {"costs": points} for track, points in zip(tracks, costs, strict=True)),
-    ]
+    return [together, *(board_of(*track, links) | {"costs": cost} for track, cost in zip(tracks, costs, strict=True))]
 
 
 def board_of(published: Published, submissions: Sequence[Submission], links: Mapping[str, str]) -> dict[str, Any]:

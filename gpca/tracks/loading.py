@@ -81,10 +81,8 @@ class TrackData:
         import torch
 
         label = torch.tensor(label_numbers(self.label.tolist(), self.labels).tolist())
-        clouds = [
-            torch.from_numpy(np.stack([np.resize(cloud, (points, 3)) for cloud in each]))
-            for each in (self.sources, self.targets)
-        ]
+        both = (self.sources, self.targets)
+        clouds = [torch.from_numpy(np.stack([np.resize(cloud, (points, 3)) for cloud in each])) for each in both]
         return torch.utils.data.TensorDataset(*clouds, label)
 
 

@@ -1,8 +1,4 @@
-"""One score across tracks: the area under the curve of generalized risk over coverage, and ranks with ties.
-
-Of the answers that are given down to a confidence, the generalized risk is the share of all samples that are answered
-wrongly; its area over the coverage is AUGRC (Traub et al. 2024). The score is the mean over the tracks.
-"""
+"""One score across tracks, the mean AUGRC (Traub et al. 2024; `NOTES`), and ranks with ties."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,8 +1,4 @@
-"""The track ``repair``: a function of one's own beside repair and the other rivals, on the samples of ``causes``.
-
-The function gets the observed cloud (N, 3), the model (M, 3), both in diameters and in the model's frame, and the
-initial pose. It returns a pose T_target_source (4, 4), or that and its confidence, or None to abstain.
-"""
+"""The track ``repair``: a function of one's own beside the rivals, on the samples of ``causes`` (docs/adding.md)."""
 
 import sys
 from collections.abc import Callable

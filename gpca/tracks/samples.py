@@ -47,8 +47,7 @@ class TrackSamples:
         cls, track: Track, cache: Path | None = None, processes: int | None = None, data_dir: Path | None = None
     ) -> Self:
         """Return the samples of a track, in the user's cache or another folder."""
-        published = Published.load(track)
-        return cls(track, published, cache or cache_of(track), processes or os.cpu_count() or 1, data_dir)
+        return cls(track, Published.load(track), cache or cache_of(track), processes or os.cpu_count() or 1, data_dir)
 
     @cached_property
     def config(self) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """Collects what is shipped with a track from a finished run."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -50,8 +50,7 @@ def collect(track: Track, run: Path, config: Mapping[str, Any]) -> Published:
                 raise InputError(run, "has predictions of other test samples than its own", "finish the run")
         methods.append(_method(key, track, config, [by_part[part] for part in parts]))
     optional = [pattern.format(source=source, seed=seed) for pattern in track.read for source, seed in parts]
-    seeds = dict.fromkeys(seed for _, seed in parts)
-    folders = product(track.training_folders, config["sources"], seeds)
+    folders = product(track.training_folders, config["sources"], dict.fromkeys(seed for _, seed in parts))
     optional += [f"{folder}/{source}/seed{seed}.npz" for folder, source, seed in folders]
     files = [track.file(*part) for part in parts] + [file for file in optional if (run / file).is_file()]
     limits = {name: getattr(tested[parts[0]].truth, name) for name in LIMITS}
@@ -97,9 +96,7 @@ def _rows(track: Track, run: Path, tested: Mapping[Part, Causes]) -> Rows:
     return Rows(axes=None, **{name: np.concatenate(parts) for name, parts in columns.items()})
 
 
-def _predictions(
-    track: Track, run: Path, config: Mapping[str, Any], parts: Sequence[Part]
-) -> dict[Key, dict[Part, Frame]]:
+def _predictions(track: Track, run: Path, config: Mapping[str, Any], parts: list[Part]) -> dict[Key, dict[Part, Frame]]:
     predictions: dict[Key, dict[Part, Frame]] = {}
     for source, seed in parts:
         if not track.predictions:

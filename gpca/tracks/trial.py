@@ -53,13 +53,10 @@ class PartPredictions(NamedTuple):
     seconds: float  # of explaining, per registration; for depth frames and scans with learning
 
     @classmethod
-    def of(
-        cls, attribution: Attribution, labels: Sequence[str], seconds: float, rows: slice | np.ndarray = slice(None)
-    ) -> Self:
+    def of(cls, attribution: Attribution, labels: Sequence[str], seconds: float, rows: Any = slice(None)) -> Self:
         """Return those in rows of an attribution."""
         calls = float(attribution.icp_calls_N[rows].mean())
-        named = label_numbers(attribution.predicted_N[rows], labels)
-        return cls(attribution.scores_N_C[rows], named, calls, seconds)
+        return cls(attribution.scores_N_C[rows], label_numbers(attribution.predicted_N[rows], labels), calls, seconds)
 
 
 class MethodTrial(NamedTuple):
@@ -144,9 +141,8 @@ def _causes(trial: MethodTrial, source: str, seed: int) -> PartPredictions:
     ]
     learned = others, _further(samples) if entry.further else []
     attribution = explained(entry, trial.settings, causes, path, read_of(source), descriptors, reenactment, *learned)
-    return PartPredictions.of(
-        attribution, samples.track.labels, float(attribution.seconds_N.mean()), causes.rows("test")
-    )
+    seconds = float(attribution.seconds_N.mean())
+    return PartPredictions.of(attribution, samples.track.labels, seconds, causes.rows("test"))
 
 
 def _hard(trial: MethodTrial, source: str, seed: int) -> PartPredictions:

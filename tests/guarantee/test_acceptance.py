@@ -5,6 +5,7 @@ from math import inf
 import numpy as np
 import pytest
 
+from gpca.guarantee import acceptance
 from gpca.guarantee.acceptance import accepted_below, accepted_in_hindsight
 
 
@@ -35,20 +36,25 @@ def test_few_right_poses_are_not_enough(count, accepted):
     assert limit == (pytest.approx(score_N[-1]) if accepted else None)
 
 
-def test_equal_scores_are_accepted_together_and_infinite_ones_never():
+def test_equal_scores_are_accepted_together_and_infinite_ones_never(monkeypatch):
     score_N = np.array([0.1] * 40 + [0.2] * 40 + [inf])
     wrong_N = np.array([False] * 79 + [True, False])
     family_N = np.arange(81) % 8
-    assert accepted_below(score_N, wrong_N, family_N, risk=0.03, confidence=0.5) == pytest.approx(0.2)
+    with monkeypatch.context() as patch:
+        patch.setattr(acceptance, "WRONG", 0.03)
+        patch.setattr(acceptance, "CONFIDENCE", 0.5)
+        assert accepted_below(score_N, wrong_N, family_N) == pytest.approx(0.2)
     wrong_N[40:60] = True
     assert accepted_below(score_N, wrong_N, family_N) == pytest.approx(0.1)
     assert accepted_below(score_N[:0], wrong_N[:0], family_N[:0]) is None
 
 
-def test_in_hindsight_the_largest_limit_with_few_wrong_counts_for_each_weight():
+def test_in_hindsight_the_largest_limit_with_few_wrong_counts_for_each_weight(monkeypatch):
     score_N, wrong_N = np.array([3.0, 1, 2, 2, inf]), np.array([False, False, True, False, False])
     weights_B_N = np.array([[1.0] * 5, [1, 1, 0, 1, 1], [0, 0, 1, 0, 0]])
-    accepted_B_N = accepted_in_hindsight(score_N, wrong_N, weights_B_N, risk=0.3)
+    monkeypatch.setattr(acceptance, "WRONG", 0.3)
+    accepted_B_N = accepted_in_hindsight(score_N, wrong_N, weights_B_N)
     assert accepted_B_N.tolist() == [[True] * 4 + [False], [True] * 4 + [False], [False] * 5]
-    assert accepted_in_hindsight(score_N, wrong_N, weights_B_N, risk=0.2)[0].tolist() == [False, True] + [False] * 3
+    monkeypatch.setattr(acceptance, "WRONG", 0.2)
+    assert accepted_in_hindsight(score_N, wrong_N, weights_B_N)[0].tolist() == [False, True] + [False] * 3
     assert accepted_in_hindsight(score_N[:0], wrong_N[:0], weights_B_N[:, :0]).shape == (3, 0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from baselines.pair import PairGPCA
-from baselines.residuals import residuals_logistic
+from baselines.residuals import logistic
 from gpca.encoders.registry import EncoderSettings
 from gpca.steps.control_samples import ControlSettings, encode, of_unseen_objects
 
@@ -123,7 +123,7 @@ def test_what_is_measured_of_a_registration_is_measured_once_for_all_controls(si
         "pair": rival(
             partial(PairGPCA, True, "tiny", 100, points=32, iterations=2, inducing=4, draws=10), "registrations"
         ),
-        "residuals": rival(partial(residuals_logistic, "tiny", 100), "uncertainty/removal"),
+        "residuals": rival(partial(logistic, "tiny", 100), "uncertainty/removal"),
     }
     found = experiment(six, "label_noise_30", "shuffled", rivals=rivals).run(six, {})
     assert measured == [len(six)]

@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from baselines.residuals import residuals_logistic
+from baselines.residuals import logistic
 from baselines.sensitivity import sa_local_additive
 from baselines.shap_kl import shap_over_knobs
 from gpca.alignment.methods import registry
@@ -30,7 +30,7 @@ SETTINGS = ExchangeSettings(train=9, test=3, points=64, estimated_train=9, estim
 RIVALS = {
     "shap_additive": rival(partial(shap_over_knobs, "tiny", 100), "uncertainty/additive"),
     "sa_local_additive": rival(partial(sa_local_additive, "tiny", 100), "uncertainty/additive"),
-    "residuals_logistic": rival(partial(residuals_logistic, "tiny", 100), "uncertainty/removal", observed_only=True),
+    "residuals_logistic": rival(partial(logistic, "tiny", 100), "uncertainty/removal", observed_only=True),
 }
 
 

@@ -1,10 +1,4 @@
-"""Local methods that iterate outside the suite's own stages: ICP by the compiled loop, by Open3D and by small_gicp.
-
-Point-to-point ICP (Besl & McKay 1992), point-to-plane ICP (Chen & Medioni 1992), and generalized ICP (Segal et al.
-2009), which fits small planes to both clouds. A robust kernel weighs a correspondence by its residual r, so that
-outliers count less: Huber min(1, k/r), Cauchy 1/(1 + (r/k)²), Geman-McClure 1/(1 + (r/k)²)², Tukey (1 - (r/k)²)² up to
-k and nothing beyond.
-"""
+"""Local methods that iterate outside the suite's own stages: ICP by the compiled loop, Open3D and small_gicp."""
 
 from functools import partial
 from importlib import import_module
@@ -19,6 +13,8 @@ from gpca.alignment.methods.interface import ITERATIONS, REACH, FailedRegistrati
 from gpca.process.environment import require_open3d
 from gpca.rigid import transform
 
+# Weights by the residual r: Huber min(1, k/r), Cauchy 1/(1 + (r/k)²), Geman-McClure its square, and Tukey
+# (1 - (r/k)²)² up to k.
 Kernel = Literal["HuberLoss", "CauchyLoss", "GMLoss", "TukeyLoss"]
 # k, in diameters. At 0.02, the middle of the protocol's noise, a poor start makes most points outliers: on a
 # development seed, Tukey aligned half of the pairs with a pose error, and nearly all at 0.05.
@@ -46,7 +42,7 @@ def align_compiled(pair: Pair, correspondence_distance: float = REACH, max_itera
     return Outcome(T, float(fitness), float(rmse), failure_of_a_step(pair, T, T_further, max_iterations))
 
 
-def align_by_open3d(
+def align_open3d(
     method: Method,
     kernel: Kernel | None,
     pair: Pair,
@@ -69,9 +65,7 @@ def align_by_open3d(
     return Outcome(found.T_target_source, found.fitness, found.inlier_rmse, failure)
 
 
-def align_by_small_gicp(
-    pair: Pair, correspondence_distance: float = REACH, max_iterations: int = ITERATIONS
-) -> Outcome:
+def align_small_gicp(pair: Pair, correspondence_distance: float = REACH, max_iterations: int = ITERATIONS) -> Outcome:
     """Run generalized ICP of small_gicp (Koide 2024).
 
     Clouds and tree are made here, because small_gicp thins plain arrays to cells of 0.25 units, a quarter of an object.
@@ -101,17 +95,15 @@ def align_by_small_gicp(
     return Outcome.at(pair, T_found, correspondence_distance, failure)
 
 
-_to_planes = partial(align_by_open3d, "point_to_plane")
+_to_planes = partial(align_open3d, "point_to_plane")
 METHODS = {
     "point_to_point": MethodEntry("ICP, point-to-point", align_compiled, points_only=True),
-    "point_to_point_open3d": MethodEntry(
-        "ICP, point-to-point (Open3D)", partial(align_by_open3d, "point_to_point", None)
-    ),
+    "point_to_point_open3d": MethodEntry("ICP, point-to-point (Open3D)", partial(align_open3d, "point_to_point", None)),
     "point_to_plane": MethodEntry("ICP, point-to-plane", partial(_to_planes, None)),
     "huber": MethodEntry("ICP, point-to-plane, Huber", partial(_to_planes, "HuberLoss")),
     "cauchy": MethodEntry("ICP, point-to-plane, Cauchy", partial(_to_planes, "CauchyLoss")),
     "geman_mcclure": MethodEntry("ICP, point-to-plane, Geman-McClure", partial(_to_planes, "GMLoss")),
     "tukey": MethodEntry("ICP, point-to-plane, Tukey", partial(_to_planes, "TukeyLoss")),
-    "gicp": MethodEntry("GICP", partial(align_by_open3d, "generalized", None)),
-    "gicp_small": MethodEntry("GICP (small_gicp)", align_by_small_gicp, package="small_gicp", points_only=True),
+    "gicp": MethodEntry("GICP", partial(align_open3d, "generalized", None)),
+    "gicp_small": MethodEntry("GICP (small_gicp)", align_small_gicp, package="small_gicp", points_only=True),
 }

@@ -98,8 +98,7 @@ def align_by_kiss_matcher(pair: Pair, voxel: float = VOXEL, correspondence_dista
         raise FailedRegistration(f"KISS-Matcher: {fault}") from fault
     if not result.valid or matcher.get_num_final_inliers() < FEWEST:
         raise FailedRegistration(f"fewer than {FEWEST} correspondences agree")
-    T_target_source = rigid_motion(result.rotation, np.ravel(result.translation))
-    return Outcome.at(pair, T_target_source, correspondence_distance)
+    return Outcome.at(pair, rigid_motion(result.rotation, np.ravel(result.translation)), correspondence_distance)
 
 
 @cache

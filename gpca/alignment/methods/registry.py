@@ -17,9 +17,7 @@ from gpca.settings import require_arguments
 
 # Includes methods whose package is missing.
 REENACTMENT = ("gpca.reenactment.registration",)
-REGISTRY: Registry[MethodEntry] = Registry(
-    "registration method", __package__, "METHODS", last=REENACTMENT, outside=MethodEntry
-)
+REGISTRY = Registry("registration method", __package__, "METHODS", last=REENACTMENT, outside=MethodEntry)
 methods, method_entry, method_module = REGISTRY.entries, REGISTRY.entry, REGISTRY.module
 
 

@@ -90,8 +90,7 @@ class Stages:
         target_n_3 = matches.pair.target[matches.rows]
         if self.metric == "point_to_point":
             return best_motion(matches.source, target_n_3, weights_n)
-        normals_n_3 = matches.pair.normals("target")[matches.rows]
-        return plane_step(matches.source, target_n_3, normals_n_3, weights_n)
+        return plane_step(matches.source, target_n_3, matches.pair.normals("target")[matches.rows], weights_n)
 
 
 def run_stages(pair: Pair, stages: Stages, max_iterations: int) -> tuple[np.ndarray, Matches, str]:
@@ -113,10 +112,7 @@ def nearest(distance_n: np.ndarray, count: int) -> np.ndarray:
 
 
 def align_trimmed(
-    pair: Pair,
-    overlap: Share = 0.0,
-    correspondence_distance: float = REACH,
-    max_iterations: int = ITERATIONS,
+    pair: Pair, overlap: Share = 0.0, correspondence_distance: float = REACH, max_iterations: int = ITERATIONS
 ) -> Outcome:
     """Align the share that fits best, or find it by ψ(ξ) = e / ξ^(1+λ), e the mean square (Chetverikov et al. 2002)."""
 
@@ -137,11 +133,7 @@ def align_trimmed(
 
 
 def align_variant(
-    stage: str,
-    change: Callable,
-    pair: Pair,
-    correspondence_distance: float = REACH,
-    max_iterations: int = ITERATIONS,
+    stage: str, change: Callable, pair: Pair, correspondence_distance: float = REACH, max_iterations: int = ITERATIONS
 ) -> Outcome:
     """Run point-to-plane ICP with one stage changed; rows are drawn once per pair."""
     changed: dict[str, Any] = {stage: change(pair) if stage == "rows" else change}
