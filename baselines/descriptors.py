@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 
 from baselines.gates import Alarm
+from baselines.pair import CLOUDS, WITH_RUNS
 from gpca.causes.dataset import LABELS
 from gpca.causes.descriptors import EVERY, EVERYTHING, RESIDUALS, Columns, seen
 from gpca.causes.settings import DENSITIES
@@ -24,8 +25,6 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import seed_of
 from gpca.settings import Count, Positive
 
-CLOUDS: Sees = ("pair",)
-WITH_RUNS: Sees = ("pair", "motion", "runs")
 ALL: Sees = (*WITH_RUNS, "remedies")
 REENACTMENT: Sees = (*WITH_RUNS, "reenactment")
 WITHOUT = "clouds alone"  # in titles: no motion of ICP, no further runs, no remedies

@@ -93,13 +93,7 @@ class LearnedPairGPCA(PairDescription, GPCA):
 
 
 def draw_pairs(
-    points: str,
-    motion: str,
-    registrations: Registrations,
-    rows: np.ndarray,
-    n_points: int,
-    *axes: object,
-    fewest: int | None = None,
+    points: str, motion: str, registrations: Registrations, rows: np.ndarray, n_points: int, *axes: object, **_: object
 ) -> list[torch.Tensor]:
     """Draw `n_points` random points of either cloud, (B, 2, n_points, F), with the motions (B, M)."""
     import torch

@@ -15,6 +15,7 @@ from gpca.settings import Count, Positive
 
 CLOUDS: Sees = ("pair",)
 WITH_MOTION: Sees = ("pair", "motion")
+WITH_RUNS: Sees = ("pair", "motion", "runs")
 WITHOUT = "without ICP's motion"  # in titles
 
 

@@ -5,7 +5,8 @@ from functools import partial
 
 import numpy as np
 
-from baselines.pair import WITH_MOTION
+from baselines.descriptors import REENACTMENT
+from baselines.pair import WITH_MOTION, WITH_RUNS
 from baselines.untrained import GatedRule, Rule
 from gpca.explainers.classifiers import standardized_regression
 from gpca.explainers.interface import REENACTED, ClassifierExplainer, ExplainerEntry, attached, for_causes, measured
@@ -93,10 +94,7 @@ def _entries(of: Callable[[type], type], rule: ExplainerEntry) -> dict[str, Expl
             "Logistic regression on ten trivial numbers", partial(logistic, trivial), WITH_MOTION
         ),
         "hypotheses": ExplainerEntry(
-            "Hypotheses with thresholds, not enacted",
-            partial(tree, of(Hypotheses)),
-            ("pair", "motion", "runs", "reenactment"),
-            reads=REENACTED,
+            "Hypotheses with thresholds, not enacted", partial(tree, of(Hypotheses)), REENACTMENT, reads=REENACTED
         ),
     }
 
@@ -107,7 +105,7 @@ CAUSE_EXPLAINERS = _entries(
     ExplainerEntry(
         "Rule, constants fitted, nominal by the best gate",
         partial(GatedRule, FittedRule),
-        ("pair", "motion", "runs"),
+        WITH_RUNS,
         reads="descriptors",
     ),
 )

@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 
 from baselines.gates import GATES, NominalThreshold, motion_alarm
+from baselines.pair import WITH_MOTION, WITH_RUNS
 from gpca.causes.dataset import LABELS
 from gpca.causes.truth import NOMINAL
 from gpca.explainers.interface import ExplainerEntry, ScoringExplainer, for_causes
@@ -90,15 +91,12 @@ class GatedRule(ScoringExplainer):
 EXPLAINERS = {
     "chance": ExplainerEntry("Chance", Chance, ()),
     "most_frequent": ExplainerEntry("Most frequent label", MostFrequent, ()),
-    "rule": ExplainerEntry("Rule of three lines", ThresholdRule, ("pair", "motion")),
+    "rule": ExplainerEntry("Rule of three lines", ThresholdRule, WITH_MOTION),
 }
 CAUSE_EXPLAINERS = {
     "chance": ExplainerEntry("Chance", for_causes(Chance), ()),
     "most_frequent": ExplainerEntry("Most frequent label", for_causes(MostFrequent), ()),
     "rule": ExplainerEntry(
-        "Rule, nominal by the best gate",
-        partial(GatedRule, ThresholdRule),
-        ("pair", "motion", "runs"),
-        reads="descriptors",
+        "Rule, nominal by the best gate", partial(GatedRule, ThresholdRule), WITH_RUNS, reads="descriptors"
     ),
 }

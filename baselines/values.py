@@ -27,12 +27,8 @@ def charged(attribution: Attribution, registrations: Registrations, conditions: 
     seconds_N, icp_seconds_N, icp_calls_N = (
         attached(registrations, name)[:, columns].sum(axis=1) for name in ("seconds", "icp_seconds", "icp_calls")
     )
-    return replace(
-        attribution,
-        seconds_N=seconds_N + attribution.seconds_N,
-        icp_seconds_N=icp_seconds_N,
-        icp_calls_N=icp_calls_N.astype(int),
-    )
+    icp: dict[str, np.ndarray] = {"icp_seconds_N": icp_seconds_N, "icp_calls_N": icp_calls_N.astype(int)}
+    return replace(attribution, seconds_N=seconds_N + attribution.seconds_N, **icp)
 
 
 class ChargedValues(ScoringExplainer):

@@ -124,10 +124,8 @@ def conditions(scored: Scored) -> list[Condition]:
     for half_N in (scored.state == NOMINAL, scored.state != NOMINAL):
         if (half_N & asked_N).any():
             hard_N |= half_N & (scored.severity > np.median(scored.severity[half_N & asked_N]))
-    listed += [
-        Condition("milder", asked_N & ~hard_N, asked_N & hard_N, SHIFTED),
-        Condition("harder", asked_N & hard_N, asked_N & ~hard_N, SHIFTED),
-    ]
+    listed.append(Condition("milder", asked_N & ~hard_N, asked_N & hard_N, SHIFTED))
+    listed.append(Condition("harder", asked_N & hard_N, asked_N & ~hard_N, SHIFTED))
     if real_N.any():
         listed.append(Condition("frames", for_frames_N & ~real_N, real_N, SHIFTED))
     return listed

@@ -1,7 +1,4 @@
-"""Estimates the time left of a run, beside Snakemake's count of jobs.
-
-The expected time of a job is the mean of its rule in a measured run (`TIMES`), else the mean of all other jobs.
-"""
+"""The time left of a run: of a job, the mean of its rule in a measured run (`TIMES`), else that of all other jobs."""
 
 import csv
 import logging

@@ -119,8 +119,7 @@ class Episode:
 
     def solved_by(self, actions: tuple[str, ...], by_name: Mapping[str, Action], settings: LoopSettings) -> bool:
         """Whether the pose is right after these actions, of which all but the last were taken."""
-        self.take(actions, by_name, settings)
-        return self.is_right(actions)
+        return is_right(self.take(actions, by_name, settings), self._success)
 
     def take(self, actions: tuple[str, ...], by_name: Mapping[str, Action], settings: LoopSettings) -> Attempt:
         """The outcome after these actions, of which all but the last were taken."""

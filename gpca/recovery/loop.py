@@ -99,11 +99,8 @@ def summary(means: Means) -> dict:
     policy, gate = means.policy, means.gate
     thresholds = asdict(policy.thresholds) | ({"gate": gate.threshold} if gate else {})
     thresholds |= {"alarm": means.alarm} if means.alarm is not None else {}
-    return {
-        "thresholds": {name: round(value, 6) for name, value in thresholds.items()},
-        "treatments": dict(policy.treatments),
-        "order": list(means.order),
-    }
+    rounded = {name: round(value, 6) for name, value in thresholds.items()}
+    return {"thresholds": rounded, "treatments": dict(policy.treatments), "order": list(means.order)}
 
 
 class Reenactor:

@@ -89,12 +89,9 @@ def table_of(published: Published, submitted: Mapping[str, Method], scores: Fram
         columns[f"minus {name}"] = Column(title, decimals, limits=limits)
     columns |= {"icp_calls": SHOWN["icp_calls"], "samples": SHOWN["samples"]}
     table.compare_down(COLUMNS[track.name], same=len(heads))
-    return table.build(
-        caption=f"Track {track.name}, samples {published.version}: {track.title}",
-        column_head="metric",
-        columns=columns,
-        footnotes=_footnotes(published, submitted),
-    )
+    caption = f"Track {track.name}, samples {published.version}: {track.title}"
+    footnotes = _footnotes(published, submitted)
+    return table.build(caption=caption, column_head="metric", columns=columns, footnotes=footnotes)
 
 
 def _footnotes(published: Published, submitted: Mapping[str, Method]) -> tuple[str, ...]:
@@ -165,11 +162,8 @@ def read_submissions(folder: Path) -> tuple[dict[str, list[Submission]], list[st
 
 def boards(submissions: Mapping[str, Sequence[Submission]]) -> list[dict[str, Any]]:
     """Return the board of all tracks, and :func:`board_of` each, with the submissions by the name of the track."""
-    tracks = [
-        (Published.load(track), submissions.get(name, ()))
-        for name, track in TRACKS.items()
-        if (PUBLISHED / f"{name}.npz").is_file()
-    ]
+    shipped = [name for name in TRACKS if (PUBLISHED / f"{name}.npz").is_file()]
+    tracks = [(Published.load(TRACKS[name]), submissions.get(name, ())) for name in shipped]
     links = {each.method.name: each.head["link"] for _, sent in tracks for each in sent if each.head["link"] != NO_LINK}
     methods = [(of, {each.method.name: each.method for each in sent}) for of, sent in tracks]
     together, costs = overall(methods, links)

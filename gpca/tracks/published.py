@@ -111,13 +111,11 @@ class Published:
 
     def truth_of(self, rows: np.ndarray) -> SampleTruth:
         """Return the truth of rows of one part, given by their numbers."""
-        limits: dict[str, Any] = {**self.limits, "uncertainty_limit": float(self.rows.uncertainty_limit[rows[0]])}
-        truth, again = (
-            Truth(getattr(self.rows, f"error{which}")[rows], getattr(self.rows, f"uncertainty{which}")[rows], **limits)
-            for which in ("", "_again")
-        )
-        cluster, symmetric, shown = (getattr(self.rows, name)[rows] for name in ("cluster", "symmetric", "error_shown"))
-        return SampleTruth(truth, again, cluster, symmetric, shown)
+        part = self.rows.subset(rows)
+        limits: dict[str, Any] = {**self.limits, "uncertainty_limit": float(part.uncertainty_limit[0])}
+        truth = Truth(part.error, part.uncertainty, **limits)
+        again = Truth(part.error_again, part.uncertainty_again, **limits)
+        return SampleTruth(truth, again, part.cluster, part.symmetric, part.error_shown)
 
     def save(self, path: Path) -> None:
         """Write the npz; equal contents give equal bytes."""

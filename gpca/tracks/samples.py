@@ -151,14 +151,8 @@ def _run(recipe: Recipe, folder: Path) -> None:
     # Sorted as the rules of the workflow give settings: the first of several datasets comes first in the samples.
     given = json.dumps({"step": recipe.step, "given": dict(recipe.given), "files": files}, sort_keys=True)
     paths = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
-    done = subprocess.run(
-        [sys.executable, "-c", _IN_PROCESS],
-        input=given,
-        env={**os.environ, "PYTHONPATH": paths, "PYTHONSAFEPATH": "1"},
-        text=True,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-    )
+    command, variables = [sys.executable, "-c", _IN_PROCESS], {"PYTHONPATH": paths, "PYTHONSAFEPATH": "1"}
+    done = subprocess.run(command, input=given, env={**os.environ, **variables}, text=True, capture_output=True)
     if done.returncode:
         words = done.stderr.strip().splitlines() or ["it ended without a message"]
         raise InputError(f"step {recipe.step}", words[-1].removeprefix(f"{recipe.step}: "), "see the line before")

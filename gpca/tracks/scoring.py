@@ -102,13 +102,10 @@ def measured_of(
             values[AREA] = augrc(method.scores.max(axis=1), ~right_N, weights_B_N)
             measured[name] = values, masks | dict.fromkeys(("auroc_error", AREA), masks["accuracy"])
         return measured
-    judged = {}
+    judged, parts = {}, [(published.truth_of(rows), seed, rows) for _, seed, rows in published.rows.parts()]
     for name, method in methods.items():
         named_N = method.labels_named(LABELS)
-        judged[name] = joined(
-            judged_of(published.truth_of(rows), seed, method.scores[rows], named_N[rows])
-            for _, seed, rows in published.rows.parts()
-        )
+        judged[name] = joined(judged_of(truth, seed, method.scores[rows], named_N[rows]) for truth, seed, rows in parts)
     judged[CEILING] = ceiling(published)
     on_scans = published.track.name == SCANS_TRACK
     measures, counts_in = (scan_measures, counted_of_scans) if on_scans else (measure, counted)

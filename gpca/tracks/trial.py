@@ -134,11 +134,8 @@ def _causes(trial: MethodTrial, source: str, seed: int) -> PartPredictions:
 
     descriptors = DescriptorSettings(**diagnosis["descriptors"])
     reenactment = read_settings(ReenactmentSettings, diagnosis["reenactment"])
-    others = [
-        (samples.files([f"causes/{each}/seed{seed}.npz"])[0], read_of(each))
-        for each in dict.fromkeys(part for part, _, _ in samples.parts())
-        if each != source and entry.reads != EMBEDDINGS
-    ]
+    sources = dict.fromkeys(part for part, _, _ in samples.parts() if part != source and entry.reads != EMBEDDINGS)
+    others = [(samples.files([f"causes/{each}/seed{seed}.npz"])[0], read_of(each)) for each in sources]
     learned = others, _further(samples) if entry.further else []
     attribution = explained(entry, trial.settings, causes, path, read_of(source), descriptors, reenactment, *learned)
     seconds = float(attribution.seconds_N.mean())

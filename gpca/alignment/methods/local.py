@@ -15,7 +15,7 @@ from gpca.rigid import transform
 
 # Weights by the residual r: Huber min(1, k/r), Cauchy 1/(1 + (r/k)²), Geman-McClure its square, and Tukey
 # (1 - (r/k)²)² up to k.
-Kernel = Literal["HuberLoss", "CauchyLoss", "GMLoss", "TukeyLoss"]
+Kernel = Literal["HuberLoss", "CauchyLoss", "GMLoss", "TukeyLoss", None]
 # k, in diameters. At 0.02, the middle of the protocol's noise, a poor start makes most points outliers: on a
 # development seed, Tukey aligned half of the pairs with a pose error, and nearly all at 0.05.
 SCALE = 0.05
@@ -43,20 +43,14 @@ def align_compiled(pair: Pair, correspondence_distance: float = REACH, max_itera
 
 
 def align_open3d(
-    method: Method,
-    kernel: Kernel | None,
-    pair: Pair,
-    correspondence_distance: float = REACH,
-    max_iterations: int = ITERATIONS,
+    method: Method, kernel: Kernel, pair: Pair, correspondence_distance: float = REACH, max_iterations: int = ITERATIONS
 ) -> Outcome:
     """Run Open3D's loop, with a robust kernel of the distances to planes or none; planes have the target's normals."""
     normals = None if method == "point_to_point" else pair.normals("target")
     constant = SCALE**2 if kernel == "GMLoss" else SCALE  # Open3D's Geman-McClure takes its square
     loss = getattr(require_open3d().pipelines.registration, kernel)(constant) if kernel else None
-    full, single = (
-        ICP(pair.target, normals, ICPSettings(method, correspondence_distance, iterations), loss)
-        for iterations in (max_iterations, 1)
-    )
+    settings = [ICPSettings(method, correspondence_distance, iterations) for iterations in (max_iterations, 1)]
+    full, single = (ICP(pair.target, normals, each, loss) for each in settings)
     found = full.register(pair.source, pair.T_target_source_init)
     if found.fitness == 0:
         raise FailedRegistration(f"no source point has a target point within {correspondence_distance:g} diameters")
@@ -66,10 +60,7 @@ def align_open3d(
 
 
 def align_small_gicp(pair: Pair, correspondence_distance: float = REACH, max_iterations: int = ITERATIONS) -> Outcome:
-    """Run generalized ICP of small_gicp (Koide 2024).
-
-    Clouds and tree are made here, because small_gicp thins plain arrays to cells of 0.25 units, a quarter of an object.
-    """
+    """Run generalized ICP of small_gicp (Koide 2024), whose clouds are made here, as it thins plain arrays."""
     package = import_module("small_gicp")
     source, target = package.PointCloud(pair.source), package.PointCloud(pair.target)
     tree = package.KdTree(target, num_threads=1)
