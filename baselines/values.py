@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -27,7 +27,7 @@ def charged(attribution: Attribution, registrations: Registrations, conditions: 
     seconds_N, icp_seconds_N, icp_calls_N = (
         attached(registrations, name)[:, columns].sum(axis=1) for name in ("seconds", "icp_seconds", "icp_calls")
     )
-    icp: dict[str, np.ndarray] = {"icp_seconds_N": icp_seconds_N, "icp_calls_N": icp_calls_N.astype(int)}
+    icp: dict[str, Any] = {"icp_seconds_N": icp_seconds_N, "icp_calls_N": icp_calls_N.astype(int)}
     return replace(attribution, seconds_N=seconds_N + attribution.seconds_N, **icp)
 
 
