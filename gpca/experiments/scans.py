@@ -15,7 +15,7 @@ from gpca.alignment.methods.registry import installed, method_entry, method_modu
 from gpca.declarations import Experiment, Frame, LeftOut, Names, Paths, Run, numbers, plain, table
 from gpca.declarations.step import Plan, Step, Wildcards
 from gpca.errors import InputError, require_names, with_key
-from gpca.evaluation.measures import ALL, Clustered, Measure, Parts, over_seeds, read_samples
+from gpca.evaluation.measures import ALL, Clustered, Measure, Parts, by_value, over_seeds, read_samples
 from gpca.experiments.registration_methods import method_rows, missing_methods, read_seconds, row_name
 from gpca.io.csv_file import read_numbers
 from gpca.objects.entry import Name, title_of
@@ -82,13 +82,14 @@ def check(config: dict, left_out: LeftOut) -> None:
 def present(config: Mapping[str, Any]) -> dict[str, ScanEntry]:
     """Data sets without those that are optional and do not exist, by name."""
     entries = {name: entry_of(settings) for name, settings in plain(config["scans"]["datasets"]).items()}
-    data_dir = config["data_dir"]
-    return {name: entry for name, entry in entries.items() if entry.kind == "virtual" or place_of(entry, data_dir)}
+    folder = config["data_dir"]
+    return {name: entry for name, entry in entries.items() if entry.kind == "virtual" or place_of(entry, folder)}
 
 
 def titles_of_scans(config: Mapping[str, Any]) -> dict[str, str]:
-    entries = present(config)
-    return {name: title_of({"title": entry.title, "stand_in": entry.stand_in}) for name, entry in entries.items()}
+    return {
+        name: title_of({"title": entry.title, "stand_in": entry.stand_in}) for name, entry in present(config).items()
+    }
 
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
@@ -179,27 +180,24 @@ def collect(run: Run, files: Paths) -> Frame:
 
     def parts(trials: Frame) -> Parts:
         overlap_N = trials["overlap"].to_numpy()
-        stratum_N = np.array([stratum_of(share, strata) or "" for share in overlap_N])
-        masks = {ALL: np.ones(len(trials), bool)}
-        masks |= {name: stratum_N == name for name in sorted(set(stratum_N) - {""})}
+        masks = by_value(trials, "stratum", sorted(set(trials["stratum"]) - {""}))
         for name, (low, high) in LISTS.items():
             masks[name] = (overlap_N >= low) & ((overlap_N < high) | ((high == 1) & (overlap_N == 1)))
         return masks | {name: (trials["rung"] == name).to_numpy() for name in trials["rung"].unique()}
 
-    def correct(trials: Frame) -> np.ndarray:
-        limit_N = np.where(trials["kind"] == "room", success.room_m, success.object_share * trials["size_m"])
-        return (trials["fitness"] > 0) & (trials["rmse_m"] < limit_N)
-
-    def close(trials: Frame) -> np.ndarray:
-        is_close = np.rad2deg(trials["rotation_error_rad"]) < CLOSE_DEG
-        return (trials["fitness"] > 0) & is_close & (trials["translation_error_m"] < CLOSE_M)
-
-    measures = {RECALL: correct, FAILED: lambda trials: trials["failure"] != "", CLOSE: close}
-    measured = {name: Measure(of) for name, of in measures.items()}
     rows = read_samples(files, lambda path: read_numbers(path, (*TRIAL_COLUMNS, *TEXTS), TRIAL_COLUMNS))
+    limit_N = np.where(rows["kind"] == "room", success.room_m, success.object_share * rows["size_m"])
+    is_close = np.rad2deg(rows["rotation_error_rad"]) < CLOSE_DEG
+    right = {
+        RECALL: (rows["fitness"] > 0) & (rows["rmse_m"] < limit_N),
+        FAILED: rows["failure"] != "",
+        CLOSE: (rows["fitness"] > 0) & is_close & (rows["translation_error_m"] < CLOSE_M),
+    }
+    measured = {name: Measure(name) for name in right}
     rows["method"] = [row_name(*each) for each in zip(rows["method"], rows["start"], strict=True)]
+    rows["stratum"] = [stratum_of(share, strata) or "" for share in rows["overlap"]]
     frames = []
-    for (source, _), trials in rows.assign(table="scans").groupby(["source", "method"], sort=False):
+    for (source, _), trials in rows.assign(table="scans", **right).groupby(["source", "method"], sort=False):
         draws = Clustered.drawn(trials["seed"], trials["cluster"], "scan intervals", source)
         frames.append(over_seeds(trials.reset_index(drop=True), parts, measured, draws))
     return pd.concat(frames, ignore_index=True)
@@ -219,9 +217,8 @@ def _rows(run: Run) -> Iterable[Row]:
 def _notes(run: Run, sheet: Sheet, intervals: Frame, parts: Iterable[str]) -> list[str]:
     success, counts = run.config["scans"]["success"], []
     for name, title in dict.fromkeys(row.labels[0] for row in sheet.rows):
-        recalls = where(intervals, {"source": name, "metric": RECALL})
-        samples = recalls.groupby("concept")["samples"].max()
-        scenes = plural(int(where(recalls, {"concept": ALL})["clusters"].max()), "scene")
+        most = where(intervals, {"source": name, "metric": RECALL}).groupby("concept")[["samples", "clusters"]].max()
+        samples, scenes = most["samples"], plural(int(most["clusters"][ALL]), "scene")
         counts.append(f"{title}: {', '.join(str(int(samples.get(part, 0))) for part in parts)}, of {scenes}")
     there = present(run.config)
     left_out = [entry_of(each) for name, each in plain(run.config["scans"]["datasets"]).items() if name not in there]
@@ -246,28 +243,22 @@ def _notes(run: Run, sheet: Sheet, intervals: Frame, parts: Iterable[str]) -> li
     seconds=(read_seconds, "timings/{scan_set}/method_{scan_method}/seed{scan_seed}.csv"),
 )
 def table17_scans(run: Run, intervals, seconds):
-    strata = {stratum_name(*ends): ends for ends in pairwise(run.config["scans"]["strata"])}
-    columns = {key: show(RECALL, f"{low:g} to {high:g} (%)", key) for key, (low, high) in strata.items()}
+    strata = {stratum_name(*ends): "{:g} to {:g} (%)".format(*ends) for ends in pairwise(run.config["scans"]["strata"])}
+    rungs = [Rung(**each) for each in run.config["scans"]["ladder"]]
+    starts = {each.name: f"From {each.rotation_deg:g}°, {each.translation_m:g} m (%)" for each in rungs}
     seconds_look: dict[str, Any] = {"decimals": 2, "interval": False, "limits": (0, inf), "least_is_best": True}
-    columns |= {
-        ALL: show(RECALL, "All (%)"),
+    columns = {
+        **{key: show(RECALL, title, key) for key, title in (strata | {ALL: "All (%)"}).items()},
         FAILED: show(FAILED, "Failed (%)", interval=False, least_is_best=True),
         "seconds": show("seconds", "s", factor=1, frame="seconds", **seconds_look),
+        **{key: show(RECALL, title, key) for key, title in starts.items()},
     }
-    rungs = {(rung := Rung(**each)).name: rung for each in run.config["scans"]["ladder"]}
-    columns |= {
-        key: show(RECALL, f"From {rung.rotation_deg:g}°, {rung.translation_m:g} m (%)", key)
-        for key, rung in rungs.items()
-    }
-    sheet = Sheet(
-        "table17_scans",
-        {"data": "Scans", "start": "Start", "method": "Method"},
-        _rows(run),
-        columns,
-        intervals,
-        {"seconds": seconds},
-        blank=lambda row, key: key in rungs and row.labels[1][0] != INITIAL,
-    )
+    heads, rows = {"data": "Scans", "start": "Start", "method": "Method"}, _rows(run)
+
+    def blank(row: Row, key: str) -> bool:
+        return key in starts and row.labels[1][0] != INITIAL
+
+    sheet = Sheet("table17_scans", heads, rows, columns, intervals, {"seconds": seconds}, blank=blank)
     note = (
         "Failed: given up by the method itself, or not at rest; the pose counts in the other columns all the same. s: "
         "with the global start, without voxels and normals; it differs from run to run. From: of the local "
@@ -287,17 +278,12 @@ def table17_scans(run: Run, intervals, seconds):
     **INTERVALS,
 )
 def table17_published(run: Run, intervals):
-    entries = {name: method_entry(name) for name in installed(run.config["methods"])}
-    titles = titles_of_scans(run.config)
-    rows = [
-        Row(
-            [("run", f"This run, {titles[dataset]}"), (name, entry.title), ("FPFH", "FPFH")],
-            {"source": dataset, "method": name},
-        )
-        for dataset in (name for name, entry in present(run.config).items() if entry.benchmark)
-        for name, entry in entries.items()
-        if entry.is_global
-    ]
+    entries, titles, rows = present(run.config), titles_of_scans(run.config), []
+    for dataset in (name for name, entry in entries.items() if entry.benchmark):
+        for name in installed(run.config["methods"]):
+            if (method := method_entry(name)).is_global:
+                labels = [("run", f"This run, {titles[dataset]}"), (name, method.title), ("FPFH", "FPFH")]
+                rows.append(Row(labels, {"source": dataset, "method": name}))
     title = "{}, overlap {:g} to {:g} (%)"
     columns = {name: show(CLOSE, title.format(name, *ends), name) for name, ends in LISTS.items()}
     heads = {"by": "By", "method": "Method", "features": "Features"}
