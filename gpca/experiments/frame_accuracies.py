@@ -9,7 +9,7 @@ from gpca.attribution.diagnostics import brier_score, calibration_error, negativ
 from gpca.attribution.metrics import attribution_metrics
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.declarations import Frame, Paths, Run, numbers
-from gpca.evaluation.measures import ALL, Clustered, intervals, source_method_seed, tidy
+from gpca.evaluation.measures import ALL, Clustered, by_value, intervals, source_method_seed, tidy
 from gpca.experiments.frame_labels import collect_labels
 from gpca.experiments.frames import TOGETHER, reduced_backbones
 from gpca.pairs.dataset import read_samples_of_frames
@@ -96,10 +96,9 @@ def collect_intervals(run: Run, prediction_files: Paths, pose_files: Paths) -> F
     together = {key: pd.concat(of_seeds, ignore_index=True) for key, of_seeds in frames.items()}
     records = []
     for (source, method), rows in together.items():
-        samples = Clustered.drawn(rows["seed"], rows["cluster"], "frame intervals", source)
-        right_N, concept = rows["right"].to_numpy(bool), rows["concept_true"]
-        chosen = {(TOGETHER, ALL): np.ones(len(rows), bool)}
-        chosen |= {(TOGETHER, name): concept.eq(name).to_numpy() for name in concept.unique()}
+        samples, right_N = Clustered.drawn(rows["seed"], rows["cluster"], "frame intervals", source), rows["right"]
+        by_concept = by_value(rows, "concept_true", rows["concept_true"].unique())
+        chosen = {(TOGETHER, concept): of_N for concept, of_N in by_concept.items()}
         parts = rows.columns[rows.columns.get_loc("right") + 1 :]
         chosen |= {(name, ALL): rows[name].eq(True).to_numpy() for name in parts}
         for (table, part), of_N in chosen.items():

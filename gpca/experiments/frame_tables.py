@@ -1,5 +1,6 @@
 """Tables of depth frames: Table VI, by backbone and reduction, and by seen and unseen objects."""
 
+from itertools import product
 from math import inf
 from typing import Any
 
@@ -44,23 +45,15 @@ def table6_backbones(run: Run, intervals, metrics):
         {name: frames.BACKBONES.get(name, name) for name in names}
         for names in (section["backbones"], section["published"].values())
     )
-    untrained = {
-        name: title for name, title in run.titles(explainer_entry, section["explainers"]).items() if name in TRIVIAL
-    }
+    untrained = run.titles(explainer_entry, [name for name in section["explainers"] if name in TRIVIAL])
     of_frames = {"table": TOGETHER, "source": REAL_WORLD}
+    reductions = {name: REDUCTIONS[name] for name in section["reductions"]}
     rows = [
-        Row(
-            [encoder, (reduction, REDUCTIONS[reduction])],
-            of_frames | {"method": f"{encoder[0]}-{reduction}"},
-            rival=encoder[0] in judged,
-        )
-        for encoder in (judged | published).items()
-        for reduction in section["reductions"]
+        Row([encoder, reduction], of_frames | {"method": f"{encoder[0]}-{reduction[0]}"}, rival=encoder[0] in judged)
+        for encoder, reduction in product((judged | published).items(), reductions.items())
     ]
-    rows += [
-        Row([method, ("none", REDUCTIONS["none"])], of_frames | {"method": method[0]})
-        for method in (CLASSIC | untrained).items()
-    ]
+    none = ("none", REDUCTIONS["none"])
+    rows += [Row([each, none], of_frames | {"method": each[0]}) for each in (CLASSIC | untrained).items()]
     parameters = {
         name: parameter_count(make_encoder(encoders[name]["backbone"], encoders[name].get("options", {})))
         for name in judged | published
@@ -78,8 +71,7 @@ def table6_backbones(run: Run, intervals, metrics):
             cells["parameters"] = plain_cell(parameters[encoder] / 1000, *counts)
         return cells
 
-    first = next(iter(judged))
-    rival = f"To {judged[first]}"
+    rival = f"To {next(iter(judged.values()))}"
     columns = {
         "accuracy": show("accuracy", "Mean acc. (%)"),
         "classifiers": Column("Std. dev. (%)", **SPREAD),
@@ -124,17 +116,15 @@ def table6_seen_unseen(run: Run, intervals, metrics):
     methods |= run.titles(explainer_entry, section["explainers"])
     reads = {name: explainer_entry("gpca" if name in embedded else name).sight for name in methods}
     rows = with_label(crossed(("source", conditions), ("method", methods)), lambda row: reads[row.where["method"]])
-    datasets = sorted({name for name in intervals["table"] if name.startswith(DATASET)})
     columns = {name: show("accuracy", title, where={"table": name}) for name, title in EVERYTHING_SEEN.items()}
-    for name in datasets:
+    for name in sorted({name for name in intervals["table"] if name.startswith(DATASET)}):
         title = f"{dataset_in_words(name.removeprefix(DATASET))} (%)"
         columns[name] = show("accuracy", title, where={"table": name}, interval=False)
 
     def more(row: Row, _subset):
-        of_all = where(metrics, {**row.where} | {"table": TOGETHER, "concept": ALL})
-        values = {metric: where(of_all, {"metric": metric})["value"] for metric in (*NOT_SHARES, "test_samples")}
-        samples = int(values["test_samples"].sum())
-        return {metric: cell_of_repeats(values[metric].to_numpy(), samples) for metric in NOT_SHARES}
+        of_all = where(metrics, {**row.where} | {"table": TOGETHER, "concept": ALL}).set_index("metric")["value"]
+        samples = int(of_all[of_all.index == "test_samples"].sum())
+        return {metric: cell_of_repeats(of_all[of_all.index == metric].to_numpy(), samples) for metric in NOT_SHARES}
 
     heads = {"condition": "Initial poses", "method": "Method", "reads": "Reads"}
     sheet = Sheet("table6_seen_unseen", heads, rows, columns | NOT_SHARES, intervals, more=more)

@@ -15,7 +15,7 @@ from gpca.errors import InputError
 from gpca.evaluation.measures import read_all_metrics, read_metrics, tidy
 from gpca.experiments import reading_words
 from gpca.experiments.active_learning import learning_settings
-from gpca.experiments.specification_curve import plain_cells, plain_column, retrained_on, stand_ins
+from gpca.experiments.specification_curve import Plain, plain_cells, retrained_on, stand_ins
 from gpca.explainers.registry import explainer_module
 from gpca.io.csv_file import ANY, read_csv
 from gpca.objects.entry import Name, SourceEntry, title_of
@@ -56,12 +56,11 @@ def check(config: dict, _left_out: LeftOut) -> None:
 def names(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str, Any]:
     section = config["joint_reading"]
     is_run = section["stands_for"] in sources and bool(section["seeds"])
-    development = section["source"] if is_run else ""
     return {
         "development_seed": list(section["seeds"]) if is_run else [],
-        "development_source": development,
+        "development_source": section["source"] if is_run else "",
         "joint_severities": list(section["choices"][SEVERITIES]) if is_run else [],
-        "retrained_source": [*sources, *filter(None, [development])],
+        "retrained_source": [*sources, section["source"]] if is_run else list(sources),
     }
 
 
@@ -199,13 +198,10 @@ def table16_joint_reading(run: Run, verdicts: Frame, scores: Frame, choice: Fram
     severities, knobs = chosen.pop(SEVERITIES), KNOBS[chosen.pop("knobs")]
     severities = "the protocol's perturbations" if severities == PROTOCOL else f"{severities} perturbations"
     words = ", ".join([severities, *(reading_words.value(*each) for each in chosen.items()), knobs])
-
-    def measured(samples: str, method: str) -> dict[str, float]:
-        rows = rows_where(scores, source=samples, method=method, table="all")
-        return dict(zip(rows["metric"], rows["value"], strict=True))
+    by_samples = rows_where(scores, table="all").set_index(["source", "method", "metric"])["value"]
 
     def sentence(samples: str, method: str, subject: str) -> str:
-        score = measured(samples, method)
+        score = by_samples[samples, method]
         largest = "the largest share would be" if samples == DEVELOPMENT else "it would be"
         return (
             f"{subject}: {score['close']:.0f} of {score['numbers']:.0f} numbers are close, {100 * score['share']:.0f} "
@@ -214,11 +210,11 @@ def table16_joint_reading(run: Run, verdicts: Frame, scores: Frame, choice: Fram
             f"{100 * score['expected_column']:.0f} % within its columns (p = {score['p_column']:.2f})."
         )
 
-    there = measured(DEVELOPMENT, EVALUATED)
+    there = by_samples[DEVELOPMENT, EVALUATED]
     return table.build(
         "The paper's Tables I to V under one reading of all that they leave open" + stand_ins(run),
         "value",
-        {name: plain_column(title) for name, title in COLUMNS.items()},
+        {name: Plain(title) for name, title in COLUMNS.items()},
         (
             f"The joint reading: {words}. It was found on {development}; the paper states none.",
             sentence(DEVELOPMENT, EVALUATED, "There, of what is printed of the source that they stand for"),

@@ -108,14 +108,10 @@ HEADS = {"kernel": "Kernel", "learning_rate": "Rate", "iterations": "Iterations"
     intervals="kernel_intervals.csv",
 )
 def table4_kernels(run: Run, intervals):
-    rows = [
-        Row(
-            [(kernel, TITLES[kernel]), *((f"{number:g}",) * 2 for number in schedule)],
-            {"method": setting_name(*setting)},
-        )
-        for setting in PRINTED
-        for kernel, *schedule in [setting]
-    ]
+    rows = []
+    for setting in PRINTED:
+        labels = [(setting[0], TITLES[setting[0]]), *((f"{number:g}",) * 2 for number in setting[1:])]
+        rows.append(Row(labels, {"method": setting_name(*setting)}))
     columns = {name: show("accuracy", title, where={"source": name}) for name, title in titles(run).items()}
     sheet = Sheet("table4_kernels", HEADS, rows, columns, intervals)
     shown = [name for name in columns if (intervals["source"] == name).any()]
@@ -134,14 +130,14 @@ def table4_kernels(run: Run, intervals):
     grid=(read_grids, GRID_FILES),
 )
 def kernel_learning_curves(run: Run, grid) -> Figure:
-    shown = {name: title for name, title in titles(run).items() if (grid["source"] == name).any()}
-    if not shown:
-        raise InputError("kernels", "have no results for these sources", "run them first")
     from matplotlib.lines import Line2D
     from matplotlib.ticker import NullLocator
 
     from gpca.reporting.figures.panels import in_lines, legend_below, panels
 
+    shown = {name: title for name, title in titles(run).items() if (grid["source"] == name).any()}
+    if not shown:
+        raise InputError("kernels", "have no results for these sources", "run them first")
     drawing, axes = panels(len(CURVES), len(shown), 4.05, COLUMN_WIDTH_IN, sharex=True, sharey=True)
     rates = sorted(grid["learning_rate"].unique(), reverse=True)
     ticks = sorted(grid["iterations"].unique())
@@ -153,10 +149,9 @@ def kernel_learning_curves(run: Run, grid) -> Figure:
             for (kernel, rate), curve in sorted(by_kernel, key=lambda item: list(WIDTHS).index(item[0][0])):
                 look = {"color": COLORS[kernel], "linestyle": LINES[rates.index(rate)], "linewidth": WIDTHS[kernel]}
                 panel.plot(curve.index.get_level_values("iterations"), 100 * curve, **look)
-            for setting in PRINTED:
-                if setting in means.index:
-                    marker = {"color": COLORS[setting[0]], "markerfacecolor": "white", "markersize": 5}
-                    panel.plot(setting[2], 100 * means.loc[setting, measure], "o", clip_on=False, zorder=5, **marker)
+            for setting in means.index.intersection(PRINTED, sort=False):
+                marker = {"color": COLORS[setting[0]], "markerfacecolor": "white", "markersize": 5}
+                panel.plot(setting[2], 100 * means.loc[setting, measure], "o", clip_on=False, zorder=5, **marker)
             for (kernel, rate, iterations), value in printed_accuracies(source).items():
                 if measure == "accuracy" and (kernel, rate, iterations) in means.index:
                     filled = {"color": COLORS[kernel], "markersize": 3.5, "clip_on": False}

@@ -281,8 +281,8 @@ def table17_published(run: Run, intervals):
     entries, titles, rows = present(run.config), titles_of_scans(run.config), []
     for dataset in (name for name, entry in entries.items() if entry.benchmark):
         for name in installed(run.config["methods"]):
-            if (method := method_entry(name)).is_global:
-                labels = [("run", f"This run, {titles[dataset]}"), (name, method.title), ("FPFH", "FPFH")]
+            if (solver := method_entry(name)).is_global:
+                labels = [("run", f"This run, {titles[dataset]}"), (name, solver.title), ("FPFH", "FPFH")]
                 rows.append(Row(labels, {"source": dataset, "method": name}))
     title = "{}, overlap {:g} to {:g} (%)"
     columns = {name: show(CLOSE, title.format(name, *ends), name) for name, ends in LISTS.items()}

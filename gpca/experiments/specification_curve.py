@@ -12,6 +12,7 @@ import numpy as np
 from gpca.comparison.readings import read_judged, summarize, unresolved
 from gpca.declarations import Experiment, Figure, Frame, Names, Plan, Run, Step, Tidy, figure, table
 from gpca.errors import InputError
+from gpca.evaluation.intervals import ANYTHING
 from gpca.experiments import reading_words
 from gpca.experiments.active_learning import learning_settings
 from gpca.experiments.explained import explainer_settings
@@ -50,15 +51,11 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
         groups.SEVERITIES_RETRAINED: readings["encoders"],
     }
 
-    def values_of(group: str) -> Mapping[str, list]:
-        return readings["groups"].get(group) or {}
-
-    run = [name for name in readings["groups"] if readable.get(name, True)]
     return {
-        "reading_group": run,
+        "reading_group": [name for name in readings["groups"] if readable.get(name, True)],
         "whole_group": [name for name in readings["groups"] if name != FRAME_REPEATS],
         "estimated": f"{REAL_WORLD}_{estimated[0]}" if estimated else "",
-        "repeats": list(values_of(FRAME_REPEATS).get("repeats", [])),
+        "repeats": list((readings["groups"].get(FRAME_REPEATS) or {}).get("repeats", [])),
         "repeated_backbone": list(frames["backbones"]),
     }
 
@@ -86,15 +83,13 @@ def _files(plan: Plan, name: str) -> dict[str, list[str]]:
         methods_of = {REAL_WORLD: [*backbones, *published]}
         if name == groups.FRAME_START:
             methods_of = {REAL_WORLD: backbones, plan.names["estimated"]: plan.names["condition_backbone"]}
-        return {
-            "registrations": [f"registrations/{s}/seed{seed}.npz" for s in methods_of for seed in config["seeds"]],
-            "predictions": [
-                f"predictions/{source}/{method}/seed{seed}.csv"
-                for source, methods in methods_of.items()
-                for method in methods
-                for seed in (plan.names["published_seed"] if method in published else config["seeds"])
-            ],
-        }
+        files: dict[str, list[str]] = {"registrations": [], "predictions": []}
+        for source, methods in methods_of.items():
+            files["registrations"] += [f"registrations/{source}/seed{seed}.npz" for seed in config["seeds"]]
+            for method in methods:
+                seeds = plan.names["published_seed"] if method in published else config["seeds"]
+                files["predictions"] += [f"predictions/{source}/{method}/seed{seed}.csv" for seed in seeds]
+        return files
     sources = [source for source in group.sources if source in plan.names["source"]]
     seeds, ranges = config["seeds"][: 1 if group.costly else readings["seeds"]], list[str]()
     if name == groups.SEVERITIES_RETRAINED:
@@ -208,12 +203,11 @@ RETRAIN = Step(
 class Plain(Column):
     """Column of numbers with three digits, whatever their unit, e.g. ``0.592``."""
 
+    interval: bool = False
+    limits: tuple[float, float] = ANYTHING
+
     def text(self, cell: Cell) -> str:  # noqa: D102
         return f"{cell.mean:.3g}"
-
-
-def plain_column(title: str) -> Plain:
-    return Plain(title, interval=False, limits=(-math.inf, math.inf))
 
 
 def plain_cells(values: Mapping[str, float], seeds: float) -> dict[str, Cell | None]:
@@ -265,13 +259,11 @@ def table13_readings(run: Run, judged: Frame) -> Table:
             table.add_row(labels, plain_cells(values, rows.loc[rows["group"] == group, "n"].max()))
             every.append(of)
     inside = [of for of in every if of.inside]
+    columns: dict[str, Column] = {name: Plain(title) for name, title in COLUMNS.items()}
     return table.build(
         "The numbers that are not reproduced, under other readings of what the paper leaves unstated" + stand_ins(run),
         "value",
-        {
-            **{name: plain_column(title) for name, title in COLUMNS.items()},
-            CHANCE: Column("Chance (%)", decimals=0, interval=False),
-        },
+        columns | {CHANCE: Column("Chance (%)", decimals=0, interval=False)},
         (
             "Chance: the share of the span from Least to Most that is close to a reading (docs/comparison.md). Of the "
             f"{len(every)} rows, {len(inside)} lie within the span of their group; "

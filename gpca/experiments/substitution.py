@@ -16,14 +16,14 @@ from gpca.experiments.explained import explainer_settings, require_explained
 from gpca.experiments.registration_methods import missing_methods
 from gpca.explainers.registry import explainer_entry, explainer_module
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.sheet import Sheet, Show, crossed, show, where
+from gpca.reporting.sheet import Row, Sheet, Show, crossed, show, where
 from gpca.settings import Distinct
 from gpca.steps.exchange import ESTIMATOR, FAILURE, LABELS, ExchangeSettings, require_exchangeable
 from gpca.uncertainty.estimators.registry import estimator_entry, estimator_module
 from gpca.uncertainty.settings import MONTE_CARLO
 
 ANOTHER = "another"  # all methods but the one that registered the training pairs
-SAMPLE = ["source", "seed", "split", "sample"]
+SAMPLE = ["explainer", "source", "seed", "split", "sample"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,11 +99,12 @@ EXPLAIN = Step(
 def answers(files: Paths) -> Frame:
     """Predictions of all files, and whether each is right (none without an estimate), and the same as Monte-Carlo's."""
     rows = read_samples(files, lambda path: read_predictions(path, (*LABELS, FAILURE)), ("source",))
-    rows = rows.assign(table=rows["explainer"], method=rows["asked_of"])
+    named = rows.set_index(SAMPLE)["concept_predicted"]
+    usual_N = named[(rows["asked_of"] == MONTE_CARLO).to_numpy()].reindex(named.index).to_numpy()
     failed_N = rows[FAILURE] != ""
-    usual = rows[rows["asked_of"] == MONTE_CARLO].set_index(["explainer", *SAMPLE])["concept_predicted"]
-    usual_N = usual.reindex(rows.set_index(["explainer", *SAMPLE]).index).to_numpy()
     return rows.assign(
+        table=rows["explainer"],
+        method=rows["asked_of"],
         right=(rows["concept_true"] == rows["concept_predicted"]) & ~rows["abstained"],
         failed=failed_N,
         silent=rows["abstained"] & ~failed_N,
@@ -176,16 +177,14 @@ ANSWERED = {
     intervals="exchange_intervals.csv",
 )
 def table14_estimator_explanations(run: Run, intervals):
-    exchange = run.config["exchange"]
+    exchange, heads = run.config["exchange"], {"explainer": "Explainer", "estimator": "Uncertainty by"}
     explainers = run.titles(explainer_entry, exchange["explainers"])
-    sheet = Sheet(
-        "table14_estimator_explanations",
-        {"explainer": "Explainer", "estimator": "Uncertainty by"},
-        crossed(("table", explainers), ("method", run.titles(estimator_entry, exchange["estimators"]))),
-        BY_CONCEPT | ANSWERED,
-        intervals,
-        blank=lambda row, key: key == "agreement" and row.where["method"] == MONTE_CARLO,  # with itself
-    )
+    rows = crossed(("table", explainers), ("method", run.titles(estimator_entry, exchange["estimators"])))
+
+    def blank(row: Row, key: str) -> bool:
+        return key == "agreement" and row.where["method"] == MONTE_CARLO  # with itself
+
+    sheet = Sheet("table14_estimator_explanations", heads, rows, BY_CONCEPT | ANSWERED, intervals, blank=blank)
     return sheet.table(
         "Accuracy (%) with each estimator in place of Monte-Carlo" + run.stand_ins(exchange["sources"]),
         "metric",
@@ -212,13 +211,10 @@ def table14_method_matrix(run: Run, intervals):
     exchange = run.config["exchange"]
     methods = run.titles(method_entry, installed(exchange["methods"]))
     asked = {name: f"on {title}" for name, title in methods.items()} | {ANOTHER: "on another (mean)"}
-    sheet = Sheet(
-        "table14_method_matrix",
-        {"explainer": "Explainer", "learnt_from": "Learned from"},
-        crossed(("table", run.titles(explainer_entry, exchange["explainers"])), ("concept", methods)),
-        {name: Show(title, where={"metric": "accuracy", "method": name}) for name, title in asked.items()},
-        intervals,
-    )
+    columns = {name: Show(title, where={"metric": "accuracy", "method": name}) for name, title in asked.items()}
+    heads = {"explainer": "Explainer", "learnt_from": "Learned from"}
+    rows = crossed(("table", run.titles(explainer_entry, exchange["explainers"])), ("concept", methods))
+    sheet = Sheet("table14_method_matrix", heads, rows, columns, intervals)
     failures = where(intervals, {"metric": "failed"} | dict(sheet.rows[0].where)).set_index("method")["value"]
     failed = [f"{title} {100 * failures[name]:.1f} %" for name, title in methods.items() if name in failures]
     return sheet.table(
