@@ -5,10 +5,9 @@ from dataclasses import dataclass, field
 from importlib.util import find_spec
 from typing import Annotated, Any, Literal
 
-from gpca.errors import InputError, require_known, with_key
+from gpca.errors import InputError, with_key
 from gpca.pairs.synthesis import Reading
-from gpca.process.plugins import joined_outside
-from gpca.process.registry import load
+from gpca.process.registry import Registry, load
 from gpca.settings import Bounds, Count, PositiveShare, Share, changes_of, read_settings
 
 ENCODERS = {
@@ -17,11 +16,9 @@ ENCODERS = {
     "pointnet2": "gpca.encoders.pointnet:PointNet2",
     "pointnext": "gpca.encoders.pointnet:PointNeXt",
 }
+REGISTRY: Registry[str] = Registry("backbone", "", "ENCODERS", first=(__name__,), outside=str)
+encoders = REGISTRY.entries  # ``module:class`` by name
 OF_ANY_SIZE = ("dgcnn",)  # backbones that take clouds of different sizes in one batch
-
-
-def encoders() -> dict[str, str]:
-    return joined_outside("ENCODERS", "backbone", str, ENCODERS)
 
 
 def encoder_module(settings: Mapping) -> str:
@@ -30,14 +27,14 @@ def encoder_module(settings: Mapping) -> str:
 
 def require_backbone(backbone: str) -> None:
     """Raise an InputError that lists the backbones unless `backbone` is one of them, and its module is there."""
-    require_known("backbone", backbone, encoders())
-    module, colon, _ = encoders()[backbone].partition(":")
+    listed = REGISTRY.entry(backbone)
+    module, colon, _ = listed.partition(":")
     try:
         is_there = bool(colon) and (backbone in ENCODERS or find_spec(module) is not None)
     except (ImportError, ValueError):
         is_there = False
     if not is_there:
-        raise InputError(f"backbone '{backbone}'", f"there is no {encoders()[backbone]}", "list it as module:class")
+        raise InputError(f"backbone '{backbone}'", f"there is no {listed}", "list it as module:class")
 
 
 def make_encoder(backbone: str, options: dict):

@@ -14,15 +14,17 @@ from gpca.io.files import sha256_of_file
 from gpca.objects import downloads
 from gpca.objects.surface import Surface
 from gpca.process.code_files import ROOT
-from gpca.process.plugins import joined_outside, load
+from gpca.process.plugins import load
+from gpca.process.registry import Registry
 
 PROCEDURAL = "procedural"
-KINDS = {
+SOURCES = {
     PROCEDURAL: "gpca.objects.procedural",
     "bop": "gpca.objects.bop",
     "mesh_folder": "gpca.objects.mesh_folder",
     "uw_rgbd": "gpca.objects.point_files",
 }
+KINDS: Registry[str] = Registry("kind of source", "", "SOURCES", first=(__name__,), outside=str)
 SYSTEM = ("/dev", "/proc", "/sys")
 TEXTS = (".md", ".txt")  # licenses beside data
 # Keys of an entry that a procedural source ignores: a config may lay one over a source of files.
@@ -43,7 +45,7 @@ def resolve(entry: dict, data_dir: str | None) -> dict:
             raise InputError(subject, "names no family", "set family in the config")
         module.require_family(entry["family"])
         return {name: value for name, value in entry.items() if name not in FILE_KEYS} | {"origin": PROCEDURAL}
-    if entry.get("objects") and entry["kind"] in set(KINDS).difference(["bop"]):  # whose objects have ids
+    if entry.get("objects") and entry["kind"] in set(SOURCES).difference(["bop"]):  # whose objects have ids
         raise InputError("objects", f"are ids, which the kind {entry['kind']} has not", "leave it out, or use files")
     location, patterns = require_place(entry.get("location") or ""), entry.get("files") or ()
     require_patterns(patterns)
@@ -144,7 +146,7 @@ def data_folders(entry: dict, data_dir: str | None, downloads: str) -> dict[str,
 
 def source_modules(entry: dict) -> list[str]:
     """Return the module that reads an entry: it is imported by name at run time, so no import statement shows it."""
-    return [_kinds()[entry["kind"]]]
+    return [KINDS.entries()[entry["kind"]]]
 
 
 def find_file(place: str, data_dir: str | None) -> Path:
@@ -180,17 +182,13 @@ def require_place(place: str | Path) -> Path:
 
 
 def _module_of(kind: object) -> ModuleType:
-    kinds = _kinds()
+    kinds = KINDS.entries()
     if kind not in kinds:
         raise InputError(f"kind '{kind}'", "is not a kind of source", f"choose one of {', '.join(kinds)}")
-    module = import_module(kinds[str(kind)]) if kind in KINDS else load(kinds[str(kind)])
+    module = import_module(kinds[str(kind)]) if kind in SOURCES else load(kinds[str(kind)])
     if not hasattr(module, "surfaces" if kind == PROCEDURAL else "from_entry"):
         raise InputError(f"kind '{kind}'", f"its module {module.__name__} has no from_entry", "see docs/adding.md")
     return module
-
-
-def _kinds() -> dict[str, str]:
-    return joined_outside("SOURCES", "kind of source", str, KINDS)
 
 
 def _as_list(value: str | list | None) -> list:

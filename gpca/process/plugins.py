@@ -82,12 +82,6 @@ def _modules(groups: Iterable[str]) -> dict[str, ModuleType]:
     return {module.__name__: module for module in modules}
 
 
-def joined_outside(variable: str, kind: str, of: type, entries: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the suite's entries of a kind and those of plugins, by name."""
-    outside = entries_outside(variable, kind, of, entries)
-    return dict(entries) | {name: entry for listed in outside.values() for name, entry in listed.items()}
-
-
 def names_outside() -> set[str]:
     """Return the names of all entries of plugins, of any kind."""
     modules = _modules(GROUPS).values()
