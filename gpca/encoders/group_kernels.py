@@ -38,7 +38,7 @@ def farthest_points(points, n_centers):
 
 @njit(**OVER_CLOUDS)
 def ball_query(points, centers, radius, k):
-    """Return neighbors (B, M, k) and counts (B, M), as :func:`gpca.encoders.groups.ball_query`."""
+    """Return neighbors (B, M, k) and counts (B, M), as :class:`gpca.encoders.groups.Groups` has them."""
     batch, n, _ = points.shape
     n_centers = centers.shape[1]
     # Not np.empty: a center of NaN has no neighbor, but the slots must still be indices of points.

@@ -41,6 +41,13 @@ class Groups:
         counts_B_1 = torch.full((batch, 1), n, dtype=torch.int32, device=points_B_N_3.device)
         return cls(points_B_N_3.new_zeros(batch, 1, 3), everything_N.expand(batch, 1, n), counts_B_1, is_whole=True)
 
+    @classmethod
+    def balls(cls, points_B_N_3: torch.Tensor, centers_B_M_3: torch.Tensor, radius: float, k: int) -> Groups:
+        """Make a group of the first k points within the radius of each center."""
+        k, device = min(k, points_B_N_3.shape[1]), points_B_N_3.device
+        neighbors, counts = kernels.ball_query(_numpy(points_B_N_3), _numpy(centers_B_M_3), radius, k)
+        return cls(centers_B_M_3, torch.from_numpy(neighbors).to(device), torch.from_numpy(counts).to(device), radius)
+
 
 class GroupMLP(nn.Module):
     """Layers of linear map, batch norm and ReLU on the slots of each group, the last perhaps without; their maximum."""
@@ -161,18 +168,6 @@ def farthest_points(points_B_N_3: torch.Tensor, n_centers: int) -> torch.Tensor:
     if n <= n_centers:
         return torch.arange(n, device=points_B_N_3.device).expand(batch, n)
     return torch.from_numpy(kernels.farthest_points(_numpy(points_B_N_3), n_centers)).long().to(points_B_N_3.device)
-
-
-def ball_query(
-    points_B_N_3: torch.Tensor, centers_B_M_3: torch.Tensor, radius: float, k: int
-) -> tuple[torch.Tensor, torch.Tensor]:
-    """Return neighbors (B, M, k) and counts (B, M), int32: the first k points within the radius of each center.
-
-    Of fewer, the first one fills the remaining slots; the count is that of distinct points, at least one.
-    """
-    k, device = min(k, points_B_N_3.shape[1]), points_B_N_3.device
-    neighbors, counts = kernels.ball_query(_numpy(points_B_N_3), _numpy(centers_B_M_3), radius, k)
-    return torch.from_numpy(neighbors).to(device), torch.from_numpy(counts).to(device)
 
 
 def _numpy(x: torch.Tensor) -> np.ndarray:

@@ -3,7 +3,7 @@
 import torch
 from torch import nn
 
-from gpca.encoders.groups import GroupMLP, Groups, ball_query, farthest_points, take
+from gpca.encoders.groups import GroupMLP, Groups, farthest_points, take
 from gpca.encoders.layers import PointLinear
 
 STAGES = 4  # of PointNeXt
@@ -41,8 +41,7 @@ class PointNet2(nn.Module):
         centroids = min(self.centroids, max(1, points_B_N_3.shape[1] // 2))
         for layers, (radius, neighbours) in zip(self.levels, self.balls, strict=True):
             centers_B_M_3 = take(points_B_N_3, farthest_points(points_B_N_3, centroids))
-            around = ball_query(points_B_N_3, centers_B_M_3, radius, neighbours)
-            x_B_N_F = layers(points_B_N_3, x_B_N_F, Groups(centers_B_M_3, *around, radius))
+            x_B_N_F = layers(points_B_N_3, x_B_N_F, Groups.balls(points_B_N_3, centers_B_M_3, radius, neighbours))
             points_B_N_3, centroids = centers_B_M_3, max(1, centroids // 4)
         return self.whole(points_B_N_3, x_B_N_F, Groups.whole(points_B_N_3))[:, 0]
 
@@ -59,8 +58,8 @@ class SetAbstraction(nn.Module):
     def forward(self, points_B_N_3: torch.Tensor, x_B_N_F: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         chosen_B_M = farthest_points(points_B_N_3, max(1, points_B_N_3.shape[1] // 2))
         centers_B_M_3 = take(points_B_N_3, chosen_B_M)
-        around = ball_query(points_B_N_3, centers_B_M_3, self.radius, self.neighbors)
-        pooled_B_M_F = self.layers(points_B_N_3, x_B_N_F, Groups(centers_B_M_3, *around, self.radius))
+        balls = Groups.balls(points_B_N_3, centers_B_M_3, self.radius, self.neighbors)
+        pooled_B_M_F = self.layers(points_B_N_3, x_B_N_F, balls)
         return centers_B_M_3, (pooled_B_M_F + self.skip(take(x_B_N_F, chosen_B_M))).relu()
 
 

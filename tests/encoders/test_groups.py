@@ -1,9 +1,11 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 
 from gpca.encoders import group_kernels
-from gpca.encoders.groups import GroupMLP, Groups, ball_query, farthest_points, take
+from gpca.encoders.groups import GroupMLP, Groups, farthest_points, take
 from gpca.process.compilation import Loop
 
 
@@ -38,17 +40,17 @@ def test_farthest_points_are_those_of_a_plain_loop_and_coincide_only_when_no_oth
 def test_a_ball_holds_the_first_points_within_its_radius(radius, k):
     points = clouds()
     centers = take(points, farthest_points(points, 10))
-    neighbors, counts = ball_query(points, centers, radius, k)
-    for cloud, found, of_cloud, centers_M_3 in zip(points, neighbors, counts, centers, strict=True):
+    made = Groups.balls(points, centers, radius, k)
+    for cloud, found, of_cloud, centers_M_3 in zip(points, made.neighbors_B_M_k, made.counts_B_M, centers, strict=True):
         for indices, count, center in zip(found, of_cloud, centers_M_3, strict=True):
             assert (indices.tolist(), int(count)) == in_ball_by_a_loop(cloud.numpy(), center.numpy(), radius, k)
 
 
 def test_a_ball_holds_no_more_points_than_the_cloud():
     points = clouds(1, 6)
-    neighbors, counts = ball_query(points, points, 2.0, 32)
-    assert neighbors.tolist() == [[[0, 1, 2, 3, 4, 5]] * 6]
-    assert counts.tolist() == [[6] * 6]
+    made = Groups.balls(points, points, 2.0, 32)
+    assert made.neighbors_B_M_k.tolist() == [[[0, 1, 2, 3, 4, 5]] * 6]
+    assert made.counts_B_M.tolist() == [[6] * 6]
 
 
 def test_in_whatever_order_clouds_are_worked_on_no_bit_changes(monkeypatch):
@@ -63,7 +65,7 @@ def test_in_whatever_order_clouds_are_worked_on_no_bit_changes(monkeypatch):
         points, layers = torch.rand(4, 20, 3), GroupMLP(3, (4, 6))
         x = points.clone().requires_grad_()
         centers = take(points, farthest_points(points, 6))
-        out = layers(points, x, Groups(centers, *ball_query(points, centers, 0.5, 5)))
+        out = layers(points, x, Groups.balls(points, centers, 0.5, 5))
         out.square().sum().backward()
         parts = [out.detach(), x.grad, *(p.grad for p in layers.parameters()), *(b.float() for b in layers.buffers())]
         return [part.numpy().tobytes() for part in parts]
@@ -92,9 +94,9 @@ def inputs(in_features=5, batch=4, n=60, offset=0.0):
 def balls(points, n_centers=20, radius=0.3, k=8):
     """Some of them full, most of them padded."""
     centers = take(points, farthest_points(points, n_centers))
-    neighbours, counts = ball_query(points, centers, radius, k)
-    assert counts.min() < k == counts.max()
-    return Groups(centers, neighbours, counts, radius)
+    made = Groups.balls(points, centers, radius, k)
+    assert made.counts_B_M.min() < k == made.counts_B_M.max()
+    return made
 
 
 def in_training(evaluate, made, points, x, groups):
@@ -148,7 +150,7 @@ def test_numba_compiles_every_pass_once():
 def test_a_repeat_counts_in_the_statistics():
     made = layers(0, (6,))
     points = torch.tensor([[[0.0, 0, 0], [0.1, 0.2, 0], [0.9, 0.9, 0.9]]])
-    made(points, None, Groups(points, *ball_query(points, points, 0.3, 3)))
+    made(points, None, replace(Groups.balls(points, points, 0.3, 3), radius=1.0))
     slots = {0: [0, 1, 0], 1: [0, 1, 0], 2: [2, 2, 2]}
     relative = torch.stack([points[0, j] - points[0, g] for g, slot in slots.items() for j in slot])
     y_9_F = made.linears[0](relative).detach()

@@ -127,72 +127,49 @@ def learn_ensemble(
     Gaussian likelihood of all runs. Their average spread is aleatoric, their disagreement epistemic (Lakshminarayanan
     et al. 2017). The original is variational, on clouds. It models the error, whatever causes it.
     """
+    import torch
+
+    from gpca.portable import Adam
+
     reduce, features_E_K = _reduced(examples, COMPONENTS)
-    networks = _Ensemble(features_E_K.shape[1], hidden, members)
-    networks.fit(features_E_K, [_errors(example) for example in examples], steps, learning_rate, weight_decay)
+    random, features = generator("learned covariance"), torch.from_numpy(features_E_K)
+    shapes = (members, features_E_K.shape[1] + 1, hidden), (members, hidden + 1, 12)
+    drawn = [random.normal(size=shape) * (1 / np.sqrt(shape[1])) for shape in shapes]
+    layers = [torch.tensor(each, dtype=torch.float64, requires_grad=True) for each in drawn]
+    errors = [_errors(example) for example in examples]
+    mean = torch.from_numpy(np.array([error_n_6.mean(axis=0) for error_n_6 in errors]))
+    variance = torch.from_numpy(np.array([error_n_6.var(axis=0) for error_n_6 in errors]))
+    optimizer = Adam(layers, learning_rate)
+    for _ in range(steps):
+        optimizer.zero_grad()
+        outputs, log_variance = _predicted(layers, features)
+        misfit = ((mean - outputs).square() + variance) * torch.exp(-log_variance)
+        decay = weight_decay * sum(weights.square().sum() for weights in layers)
+        loss = 0.5 * (log_variance + misfit).sum(dim=2).mean(dim=1).sum() + decay
+        loss.backward()
+        optimizer.step()
 
     def estimate(registered: RegisteredPair) -> np.ndarray:
-        aleatoric_6, epistemic_6 = networks.variances(reduce(described(registered)[None]))
+        with torch.no_grad():
+            means, log_variances = _predicted(layers, torch.from_numpy(reduce(described(registered)[None])))
+        aleatoric_6 = torch.exp(log_variances)[:, 0].mean(dim=0).numpy()
+        epistemic_6 = means[:, 0].var(dim=0, correction=0).numpy()
         return along_axes(np.diag(aleatoric_6 + epistemic_6), intrinsic_frame(registered.pair.target))
 
     return estimate
 
 
-class _Ensemble:
-    """Networks of one hidden layer, side by side in one tensor."""
+def _predicted(layers: Sequence, features_E_K):
+    """Return the means and the logarithms of the variances (M, E, 6) of networks of one hidden layer."""
+    import torch
 
-    def __init__(self, inputs: int, hidden: int, members: int) -> None:
-        import torch
-
-        random = generator("learned covariance")
-        shapes = (members, inputs + 1, hidden), (members, hidden + 1, 12)
-        drawn = [random.normal(size=shape) * (1 / np.sqrt(shape[1])) for shape in shapes]
-        self._layers = [torch.tensor(each, dtype=torch.float64, requires_grad=True) for each in drawn]
-
-    def _predict(self, features_E_K):
-        """Return the means and the logarithms of the variances (M, E, 6) of each network."""
-        import torch
-
-        first, second = self._layers
-        ones = torch.ones(*features_E_K.shape[:-1], 1, dtype=torch.float64)
-        inputs = torch.cat([features_E_K, ones], dim=-1).expand(len(first), -1, -1)
-        hidden = torch.tanh(inputs @ first)
-        outputs = torch.cat([hidden, torch.ones_like(hidden[:, :, :1])], dim=2) @ second
-        # In units near those of the errors, so that weights near one suit both.
-        return 0.1 * outputs[:, :, :6], (2 * outputs[:, :, 6:] - 6).clamp(SMALLEST_LOG, LARGEST_LOG)
-
-    def fit(
-        self,
-        features_E_K: np.ndarray,
-        errors: Sequence[np.ndarray],
-        steps: int,
-        learning_rate: float,
-        weight_decay: float,
-    ) -> None:
-        import torch
-
-        from gpca.portable import Adam
-
-        features = torch.from_numpy(features_E_K)
-        mean = torch.from_numpy(np.array([error_n_6.mean(axis=0) for error_n_6 in errors]))
-        variance = torch.from_numpy(np.array([error_n_6.var(axis=0) for error_n_6 in errors]))
-        optimizer = Adam(self._layers, learning_rate)
-        for _ in range(steps):
-            optimizer.zero_grad()
-            outputs, log_variance = self._predict(features)
-            misfit = ((mean - outputs).square() + variance) * torch.exp(-log_variance)
-            decay = weight_decay * sum(weights.square().sum() for weights in self._layers)
-            loss = 0.5 * (log_variance + misfit).sum(dim=2).mean(dim=1).sum() + decay
-            loss.backward()
-            optimizer.step()
-
-    def variances(self, features_1_K: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the aleatoric and the epistemic variances (6,) of one pair."""
-        import torch
-
-        with torch.no_grad():
-            means, log_variances = self._predict(torch.from_numpy(features_1_K))
-        return torch.exp(log_variances)[:, 0].mean(dim=0).numpy(), means[:, 0].var(dim=0, correction=0).numpy()
+    first, second = layers
+    ones = torch.ones(*features_E_K.shape[:-1], 1, dtype=torch.float64)
+    inputs = torch.cat([features_E_K, ones], dim=-1).expand(len(first), -1, -1)
+    hidden = torch.tanh(inputs @ first)
+    outputs = torch.cat([hidden, torch.ones_like(hidden[:, :, :1])], dim=2) @ second
+    # In units near those of the errors, so that weights near one suit both.
+    return 0.1 * outputs[:, :, :6], (2 * outputs[:, :, 6:] - 6).clamp(SMALLEST_LOG, LARGEST_LOG)
 
 
 def _errors(example: Example) -> np.ndarray:

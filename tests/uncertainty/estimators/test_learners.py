@@ -51,12 +51,8 @@ def test_networks_contradict_each_other_far_from_what_they_know():
         runs = 0.005 * random.normal(size=(13, 6))
         descriptors = np.concatenate([[x], 0.01 * random.normal(size=3)])
         examples.append(Example(descriptors, runs, adjoint(FRAME) @ truth, FRAME))
-    reduce = learned.Reduction(np.array([each.descriptors for each in examples]), 4)
-    networks = learned._Ensemble(4, 16, 5)
-    features = reduce(np.array([each.descriptors for each in examples]))
-    errors = [learned._errors(each) for each in examples]
-    networks.fit(features, errors, 200, 0.01, 1e-3)
-    known, unknown = (networks.variances(reduce(np.array([[x, 0, 0, 0]])))[1].sum() for x in (0.0, 5.0))
+    estimate = learned.learn_ensemble(examples, hidden=16)
+    known, unknown = (np.trace(estimate(registered(describe=lambda x=x: np.array([x, 0, 0, 0])))) for x in (0.0, 5.0))
     assert unknown > 3 * known
 
 
