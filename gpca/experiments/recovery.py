@@ -16,8 +16,7 @@ from gpca.experiments.recovery_measures import ERROR, SEQUENCE
 from gpca.explainers.registry import explainer_entry, explainer_module, require_settings
 from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.frames.situations import SituationSettings
-from gpca.io.csv_file import numbers as number_column
-from gpca.io.csv_file import read_csv
+from gpca.io.csv_file import read_numbers
 from gpca.objects.camera import Camera
 from gpca.objects.entry import SurfacePoints
 from gpca.objects.source import data_files, data_folders, source_modules
@@ -169,11 +168,7 @@ RECOVER = Step(
         "reenactment": plan.config["diagnosis"]["reenactment"],
         "explainers": {name: plan.config["explainers"].get(name) or {} for name in explained(plan)},
     },
-    params={
-        "folders": lambda plan, _wildcards: data_folders(
-            standing(plan), plan.config["data_dir"], plan.config["downloads"]
-        )
-    },
+    params={"folders": lambda plan, _: data_folders(standing(plan), plan.config["data_dir"], plan.config["downloads"])},
     modules=lambda plan: [
         plan.encoder_module,
         *map(explainer_module, explained(plan)),
@@ -190,10 +185,9 @@ def mean_seconds(files: Paths) -> dict[str, float]:
 
     parts = []
     for path in files:
-        rows = read_csv(path, ("episode", "failed", "policy", *SECONDS), others=("step",))
-        rows = rows[rows["failed"] == "True"]
-        rows["seconds"] = sum(number_column(path, rows, name) for name in SECONDS)
-        parts.append(rows.groupby(["policy", "episode"])["seconds"].sum())
+        rows = read_numbers(path, ("episode", "failed", "policy", *SECONDS), SECONDS, others=("step",))
+        rows = rows[rows["failed"] == "True"].set_index(["policy", "episode"])
+        parts.append(sum(rows[name] for name in SECONDS).groupby(level=[0, 1]).sum())
     return pd.concat(parts).groupby(level="policy").mean().to_dict()
 
 
@@ -219,13 +213,12 @@ def table8_recovery(
     first, last = "recovered_within_1", f"recovered_within_{budget}"
     plain: dict[str, Any] = {"decimals": 0, "interval": False}
     apart: dict[str, Any] = {"interval": False, "limits": (0, inf)}
-    difference: dict[str, Any] = {"limits": (-100, 100)}
     columns = {
         **within,
         "acted_nominal": show("acted_nominal", "Acts on good (%)", decimals=0, least_is_best=True),
         **{
-            f"{metric}_{against}": show(metric, f"{k}: to {words} (points)", where={"against": against}, **difference)
-            for against, words in AGAINST.items()
+            f"{metric}_{kind}": show(metric, f"{k}: to {words} (points)", where={"against": kind}, limits=(-100, 100))
+            for kind, words in AGAINST.items()
             for k, metric in ((1, first), (budget, last))
         },
         **{f"{last}_{cause}": show(last, f"{cause.capitalize()} (%)", cause, **plain) for cause in CONCEPTS},
@@ -268,9 +261,8 @@ def tables_title(run: Run) -> str:
 def failure_counts(metrics: Frame) -> str:
     """How many failures of how many registrations there are by cause, in words."""
     rows = metrics[metrics["method"] == metrics["method"].iloc[0]]
-    parts = []
-    for cause in CONCEPTS:
-        values = rows[rows["concept"] == cause].groupby("metric")["value"].sum()
-        failures, tries = (values.get(name, 0.0) for name in ("episodes", "tries"))
-        parts.append(f"{failures:.0f} by {cause} among {tries:.0f} registrations")
-    return ", ".join(parts)
+    sums = rows.groupby(["concept", "metric"])["value"].sum()
+    return ", ".join(
+        f"{sums.get((cause, 'episodes'), 0):.0f} by {cause} among {sums.get((cause, 'tries'), 0):.0f} registrations"
+        for cause in CONCEPTS
+    )

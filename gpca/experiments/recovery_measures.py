@@ -17,7 +17,7 @@ from gpca.seeds import seed_of_file
 TABLE = "recovery"  # `table` and `source` of the rows
 ERRORS = ("error_before", "error_after")
 RECOVERY_COLUMNS = ("episode", "cause", "table", "policy", "step", "action", "failed", *ERRORS, "recovered", "tries")
-CASE = ["seed", "table", "episode"]
+CASE = ["seed", "cluster", "episode"]  # a cluster is a rendered table of a seed
 SEQUENCE, ERROR = "sequence", "error"  # kinds of rivals
 FILES = "recovery/seed{seed}.csv"
 
@@ -25,10 +25,8 @@ FILES = "recovery/seed{seed}.csv"
 def read_recovery(path: str | Path) -> Frame:
     """Read a file of the step ``recover``: numbers as numbers, `failed` and `recovered` as booleans, and its seed."""
     rows = read_csv(path, RECOVERY_COLUMNS, ("object", "symmetric", "concept", "score_*", "bald"))
-    for name in ("episode", "table", "step", "tries"):
-        rows[name] = number_column(path, rows, name).astype(int)
-    for name in ERRORS:
-        rows[name] = number_column(path, rows, name)
+    for name, kind in {"episode": int, "table": int, "step": int, "tries": int, **dict.fromkeys(ERRORS, float)}.items():
+        rows[name] = number_column(path, rows, name).astype(kind)
     booleans = {name: rows[name] == "True" for name in ("failed", "recovered")}
     return rows.assign(**booleans, seed=seed_of_file(path))
 
@@ -42,16 +40,13 @@ def collect(run: Run, files: Paths) -> Frame:
     """Measures by policy, cause and seed; results/README.md lists them."""
     recovery, records = run.config["recovery"], []
     costs, budget = dict(recovery["costs"]), recovery["loop"]["budget"]
-    for path in files:
-        rows = read_recovery(path)
-        for policy, episodes in rows.groupby("policy", sort=False):
-            for cause in (ALL, *CONCEPTS):
-                subset = episodes if cause == ALL else episodes[episodes["cause"] == cause]
-                if not subset["failed"].any():
-                    continue
-                values = policy_metrics(subset, costs, budget)
-                keys, seed = (TABLE, TABLE, policy), rows["seed"].iloc[0]
-                records += [(*keys, metric, cause, seed, float(value)) for metric, value in values.items()]
+    for rows in map(read_recovery, files):
+        for (policy, seed), episodes in rows.groupby(["policy", "seed"], sort=False):
+            for cause, of_cause in by_value(episodes, "cause", CONCEPTS).items():
+                if (subset := episodes[of_cause])["failed"].any():
+                    values = policy_metrics(subset, costs, budget)
+                    keys = TABLE, TABLE, policy
+                    records += [(*keys, metric, cause, seed, float(value)) for metric, value in values.items()]
     return tidy(records, "recovery")
 
 
@@ -78,10 +73,9 @@ def collect_intervals(run: Run, files: Paths) -> Frame:
 
     def over_all(cases: Frame, causes: Sequence[str], measures: Mapping[str, Measure]) -> Frame:
         draws = Clustered.drawn(cases["seed"], cases["cluster"], "recovery intervals")
-        cases = cases.assign(table=TABLE, source=TABLE)
         return over_seeds(cases, lambda rows: by_value(rows, "cause", causes), measures, draws)
 
-    rows = _read_all(files).rename(columns={"policy": "method"})
+    rows = _read_all(files).rename(columns={"policy": "method"}).assign(table=TABLE, source=TABLE)
     within = {
         f"recovered_within_{k}": Measure(lambda cases, k=k: cases["step"] <= k)  # type: ignore[misc]
         for k in range(1, run.config["recovery"]["loop"]["budget"] + 1)
@@ -90,13 +84,13 @@ def collect_intervals(run: Run, files: Paths) -> Frame:
     shares = {"queued": Measure("queued"), **within, "left_alone": left_alone}
     failures, good = rows[rows["failed"]], rows[~rows["failed"]].reset_index(drop=True)
     cases = failures.assign(step=steps_taken(failures), queued=failures["action"] == QUEUE)
-    cases = cases.groupby(["method", *CASE, "cluster", "cause"], sort=False)
+    cases = cases.groupby(["table", "source", "method", *CASE, "cause"], sort=False)
     cases = cases.agg(step=("step", "min"), queued=("queued", "any"), first=("action", "first")).reset_index()
     parts = [over_all(cases, CONCEPTS, shares)]
     if len(good):
         parts.append(over_all(good, (), {"acted_nominal": Measure(is_action)}))
-    order = {name: place for place, name in enumerate(rows["method"].unique())}
-    return pd.concat(parts).sort_values("method", key=lambda names: names.map(order), kind="stable")
+    order = list(rows["method"].unique())
+    return pd.concat(parts).sort_values("method", key=lambda names: names.map(order.index), kind="stable")
 
 
 @numbers("recovery_differences.csv", files=FILES)
@@ -110,9 +104,9 @@ def collect_differences(run: Run, files: Paths) -> Frame:
     actions = list(recovery["actions"])
     rows = _read_all(files)
     failures = rows[rows["failed"]]
-    cases = [failures[name] for name in ("seed", "cluster", "episode")]
     # After how many actions each failure was recovered, or inf, by policy in columns.
-    steps = steps_taken(failures).groupby([*cases, failures["policy"]], sort=False).min().unstack()
+    named = [failures[name] for name in (*CASE, "policy")]
+    steps = steps_taken(failures).groupby(named, sort=False).min().unstack()
     seeds, clusters, _ = zip(*steps.index, strict=True)
     draws = Clustered.drawn(seeds, clusters, "recovery differences")
     fixed = [name for name in steps.columns if is_fixed(name, actions)]
@@ -137,8 +131,7 @@ def steps_taken(failures: Frame) -> Series:
 def _read_all(files: Paths) -> Frame:
     import pandas as pd
 
-    parts = [read_recovery(path) for path in files]
-    if not parts:
+    if not (parts := [read_recovery(path) for path in files]):
         return intervals([], "recovery")
     rows = pd.concat(parts, ignore_index=True)
     return rows.assign(cluster=rows["seed"].astype(str) + "/" + rows["table"].astype(str))

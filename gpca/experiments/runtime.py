@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from math import inf, nan
-from typing import Annotated
+from typing import Annotated, Any
 
 from gpca.comparison.published import HARDWARE, printed_seconds, read_published
 from gpca.declarations import Experiment, Frame, Run, Tidy, table
@@ -43,12 +43,10 @@ def table7_runtime(run: Run, runtime: Frame) -> Table:
     for row in runtime.itertuples():
         seconds = {"mean": row.mean_s, "deviation": row.deviation_s, "median": row.median_s}
         cells = {name: plain_cell(1e3 * value, 1, int(row.repeats)) for name, value in seconds.items()}
-        number, device = printed.get(row.component), ""
-        if number:
-            device = number.device
+        if number := printed.get(row.component):
             cells["published"] = Cell(1e3 * number.value, nan, 1, 100, at_least=number.upper > number.value)
-        component = (row.component, COMPONENTS[row.component])
-        sheet.add_row([component, (row.device, row.device), (device, device or EMPTY)], cells)
+        device = (number.device, number.device) if number else ("", EMPTY)
+        sheet.add_row([(row.component, COMPONENTS[row.component]), (row.device, row.device), device], cells)
     here = "; ".join(f"{row.device}: {row.hardware}" for row in runtime.drop_duplicates("device").itertuples())
     there = "; ".join(f"{device}: {hardware}" for device, hardware in HARDWARE.items())
     ranges = "".join(
@@ -57,18 +55,14 @@ def table7_runtime(run: Run, runtime: Frame) -> Table:
         if number.upper > number.value
     )
     repeats, threads = (int(runtime[name].iloc[0]) for name in ("repeats", "threads"))
-
-    def milliseconds(name: str, decimals: int = 2) -> Column:
-        return Column(f"{name} (ms)", decimals=decimals, interval=False, limits=(0, inf), least_is_best=True)
-
+    titles = {"mean": "Mean", "deviation": "Std. dev.", "median": "Median", "published": "Paper"}
+    look: dict[str, Any] = {"interval": False, "limits": (0, inf), "least_is_best": True}
     return sheet.build(
         caption=f"Runtime per component on {model_title(run)}, and as the paper prints it",
         column_head="statistic",
         columns={
-            "mean": milliseconds("Mean"),
-            "deviation": milliseconds("Std. dev."),
-            "median": milliseconds("Median"),
-            "published": milliseconds("Paper", decimals=0),
+            name: Column(f"{title} (ms)", decimals=0 if name == "published" else 2, **look)
+            for name, title in titles.items()
         },
         footnotes=(
             f"Over {repeats} runs, {plural(threads, 'thread')}. Here {here}. Paper: {there}{ranges}.",

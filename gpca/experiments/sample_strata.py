@@ -24,24 +24,18 @@ def strata_of(samples: Judged) -> dict[tuple[str, str], np.ndarray]:
     """Kind and stratum -> mask (N,) of its samples; all but the states divide the failed."""
     nominal_N = samples.label == NOMINAL
     failed_N = ~nominal_N & (samples.label != BORDERLINE)
-    margin_N, error_N, number_N = samples.margin, samples.error[:, ALL], samples.causes.sum(axis=1)
-    parts = {
-        ("margin", "small"): margin_N < SMALL_MARGIN,
-        ("margin", "middle"): (margin_N >= SMALL_MARGIN) & (margin_N < LARGE_MARGIN),
-        ("margin", "large"): margin_N >= LARGE_MARGIN,
-        ("causes", "one"): number_N <= 1,
-        ("causes", "two"): number_N == 2,
-        ("causes", "three"): number_N == 3,
-        ("symmetry", "symmetric"): samples.symmetric,
-        ("symmetry", "other"): ~samples.symmetric,
-        ("error", "small"): error_N < SMALL_ERROR,
-        ("error", "middle"): (error_N >= SMALL_ERROR) & (error_N < LARGE_ERROR),
-        ("error", "large"): error_N >= LARGE_ERROR,
-        ("shown", "failed"): samples.shown == FAILED,
-        ("shown", "other"): samples.shown != FAILED,
+    number_of = {  # of a stratum, in the order of `KINDS`
+        "margin": np.digitize(samples.margin, (SMALL_MARGIN, LARGE_MARGIN)),
+        "causes": np.maximum(samples.causes.sum(axis=1), 1) - 1,
+        "symmetry": np.where(samples.symmetric, 0, 1),
+        "error": np.digitize(samples.error[:, ALL], (SMALL_ERROR, LARGE_ERROR)),
+        "shown": np.where(samples.shown == FAILED, 0, 1),
     }
-    states = {("state", "nominal"): nominal_N, ("state", "failed"): failed_N}
-    return states | {stratum: mask_N & failed_N for stratum, mask_N in parts.items()}
+    return {("state", "nominal"): nominal_N, ("state", "failed"): failed_N} | {
+        (kind, stratum): (number_N == number) & failed_N
+        for kind, number_N in number_of.items()
+        for number, stratum in enumerate(KINDS[kind][1])
+    }
 
 
 @numbers("cause_strata.csv", prediction_files=diagnosis.DIAGNOSES, causes_files=diagnosis.CAUSES_FILES)

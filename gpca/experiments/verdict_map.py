@@ -1,6 +1,7 @@
 """A map of the verdicts on the printed numbers: a cell for each mean, as the paper's tables place it."""
 
 import math
+from itertools import accumulate
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -59,22 +60,18 @@ def read_comparison(path: str | Path) -> Frame:
 def verdicts(run: Run, comparison) -> Figure:
     by_paper = comparison["reason"] == judged.PAPER_TOO_WIDE
     once = judged.judged_once(comparison.assign(verdict=comparison["verdict"].mask(by_paper, BY_PAPER)))
-    lines = [[block for table in tables for block in _blocks(table, once)] for tables in LINES]
-    heights_in = [HEAD_IN + ROW_IN * max(len(block.rows) for block in line) + GAP_IN for line in lines if line]
-    size = (TEXT_WIDTH_IN, TOP_IN + sum(heights_in))
-    drawing = style.use_style().figure(figsize=size)
-    panel = drawing.add_axes((0, 0, 1, 1), xlim=(0, size[0]), ylim=(size[1], 0))
+    lines = [line for tables in LINES if (line := [block for table in tables for block in _blocks(table, once)])]
+    heights_in = [HEAD_IN + ROW_IN * max(len(block.rows) for block in line) + GAP_IN for line in lines]
+    width_in, height_in = TEXT_WIDTH_IN, TOP_IN + sum(heights_in)
+    drawing = style.use_style().figure(figsize=(width_in, height_in))
+    panel = drawing.add_axes((0, 0, 1, 1), xlim=(0, width_in), ylim=(height_in, 0))
     panel.axis("off")
-    top_in = TOP_IN
-    for line, height_in in zip(filter(None, lines), heights_in, strict=True):
-        gap_in = (size[0] - sum(block.widths_in[1] for block in line)) / len(line)
-        left_in = 0.0
+    for line, top_in in zip(lines, accumulate([TOP_IN, *heights_in[:-1]]), strict=True):
+        gap_in, left_in = (width_in - sum(block.widths_in[1] for block in line)) / len(line), 0.0
         for block in line:
             _draw(panel, block, left_in, top_in)
             left_in += block.widths_in[1] + gap_in
-        top_in += height_in
-    counted = once["verdict"].value_counts()
-    left_in = 0.05
+    counted, left_in = once["verdict"].value_counts(), 0.05
     for verdict in dict.fromkeys([*LOOKS, *counted.index]):
         words = f"{counted.get(verdict, 0)} {verdict}"
         _cell(panel, left_in, 0.26, LOOKS.get(verdict, OTHER_LOOK)[0], width_in=0.14)
@@ -89,16 +86,15 @@ def _blocks(table: str, once: Frame) -> list[Block]:
     """Return the blocks of a table: one, but for the running text, whose numbers have a row each."""
     rows = once[once["table"] == table].to_dict("records")
     if table == TEXT:
-        named = {f"{row['row']}: {row['column']}": row for row in rows}
-        parts = [[*named][start : start + MOST_ROWS] for start in range(0, len(named), MOST_ROWS)]
+        named = [(f"{row['row']}: {row['column']}", row) for row in rows]
+        parts = [dict(named[start : start + MOST_ROWS]) for start in range(0, len(named), MOST_ROWS)]
         titles = [TITLES[TEXT]] + [""] * len(parts)
         return [
-            Block(title, part, [""], {(name, ""): named[name] for name in part})
+            Block(title, list(part), [""], {(name, ""): row for name, row in part.items()})
             for title, part in zip(titles, parts, strict=False)
         ]
-    split = {row["row"]: row["row"].split(", ") for row in rows}
     crossed = table == "VI"  # backbones by reductions
-    cells = {(split[r["row"]][0], split[r["row"]][1]) if crossed else (r["row"], r["column"]): r for r in rows}
+    cells = {tuple(row["row"].split(", ")[:2]) if crossed else (row["row"], row["column"]): row for row in rows}
     row_labels, column_labels = (list(dict.fromkeys(key[i] for key in cells)) for i in (0, 1))
     return [Block(f"Table {table}", row_labels, column_labels, cells)] if rows else []
 
@@ -115,13 +111,12 @@ def _draw(panel, block: Block, left_in: float, top_in: float) -> None:
         middle_in = below_in + ROW_IN * (i + 0.5)
         panel.text(first_in - 0.04, middle_in, SHORT.get(name, name), fontsize=SMALL_PT, ha="right", va="center")
         for j, column in enumerate(block.columns):
-            if (row := block.cells.get((name, column))) is None:
-                continue
-            color, ink = LOOKS.get(row["verdict"], OTHER_LOOK)
-            x_in = first_in + CELL_IN * j
-            _cell(panel, x_in, below_in + ROW_IN * i, color)
-            look = {"color": ink, "fontsize": SMALL_PT, "ha": "center", "va": "center"}
-            panel.text(x_in + CELL_IN / 2, middle_in, _words(row), **look)
+            if row := block.cells.get((name, column)):
+                color, ink = LOOKS.get(row["verdict"], OTHER_LOOK)
+                x_in = first_in + CELL_IN * j
+                _cell(panel, x_in, below_in + ROW_IN * i, color)
+                look = {"color": ink, "fontsize": SMALL_PT, "ha": "center", "va": "center"}
+                panel.text(x_in + CELL_IN / 2, middle_in, _words(row), **look)
 
 
 def _cell(panel, x_in: float, y_in: float, color: str, width_in: float = CELL_IN) -> None:
