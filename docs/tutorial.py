@@ -34,12 +34,13 @@ print(f"GP-CA learned from: {explainer.model.title}")
 # %%
 # A registration that should be fine
 # ----------------------------------
-# The source starts a little off. ``text`` is what the command line prints. A model whose GP-CA learned partial views
-# warns that this source shows all sides: then the diagnosis counts, and the scores of GP-CA below it do not.
+# The source starts a little off. ``text`` is what the command line prints, here with ``--verbose``. A model whose GP-CA
+# learned partial views warns that this source shows all sides: then the diagnosis counts, and the scores of GP-CA below
+# it do not.
 step = np.eye(4)
 step[:3, 3] = 0.03 * diameter_m
 fine = explainer.explain(source, target, step)
-print(fine.text())
+print(fine.text(verbose=True))
 
 # %%
 # The same object, seen badly

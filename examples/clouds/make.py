@@ -1,6 +1,7 @@
 """Make the clouds of this folder: a drill (procedural stand-in), and a noisy scan of its front that lies 75° off.
 
 python examples/clouds/make.py
+gpca explain examples/clouds/scan.ply examples/clouds/model.ply --png examples/clouds/explained.png
 """
 
 from pathlib import Path

@@ -7,7 +7,7 @@ import json
 import sys
 from argparse import Action, ArgumentParser, Namespace
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from importlib import import_module
 from importlib.util import find_spec
@@ -162,6 +162,8 @@ def add_registration_arguments(parser: ArgumentParser, given_pose: str) -> None:
     add("--scans", action="store_true", help="both clouds are partial scans of any size")
     add("--voxel", type=length, help="edge length of voxels for scans (default: from the point spacing)")
     form = parser.add_mutually_exclusive_group()
+    everything = "print all that was found as text, with the scores of GP-CA and durations"
+    form.add_argument("--verbose", action="store_true", help=everything)
     form.add_argument("--json", action="store_true", help="print one JSON object")
     form.add_argument("--json-lines", action="store_true", help="print one line of JSON per source or pair")
 
@@ -173,18 +175,22 @@ def run_explain(options: Namespace) -> int:
     if path is not None:
         require_model(path)
     rows = from_rows(options) if options.pairs else []
-    row_files = [options.pairs.parent / name for _, row in rows for key in FILES if (name := row.get(key))]
-    require_apart(options, [*OF_ONE, "queue"], [*filter(None, [path]), *row_files])
+    files = [options.pairs.parent / name for _, row in rows for key in FILES if (name := row.get(key))]
+    require_apart(options, [*OF_ONE, "queue"], [*filter(None, [path]), *files])
     if options.queue and options.queue.exists():
         from gpca.active_learning.labeling import require_queue
 
         require_queue(options.queue)
     read_target = target_reader(options.scans)
-    pairs: list[tuple] = [(f"{place}: ", row) for place, row in rows]
-    if not options.pairs:
+    pairs: list[tuple[str, dict[str, Any], Callable[[], Inputs]]] = []
+    for place, row in rows:
+        named = {name: options.pairs.parent / (row[name] or "").strip() for name in COLUMNS}
+        pairs.append((f"{place}: ", named, partial(inputs_in, row, options)))
+    if options.source:
         read_target(options.target)
-        start, units = options.pose or options.init, (options.unit, options.source_unit)
-        pairs = [("", Inputs(source, options.target, start, *units)) for source in options.source]
+    for source in options.source:
+        given = Inputs(source, options.target, options.pose or options.init, options.unit, options.source_unit)
+        pairs.append(("", vars(given), partial(replace, given)))
     # Unknown methods and estimators are reported here, so that no message blames a file for them.
     if options.method is not None:
         from gpca.alignment.methods.registry import make_method
@@ -199,68 +205,77 @@ def run_explain(options: Namespace) -> int:
     say_when_compiling()
     from gpca.model.explanation import LEARNED, Explanation
 
-    explain: Callable[..., ExplainedRegistration]
-    learned, names, extra = LEARNED, dict[str, str](), dict[str, str]()
+    learned, more = LEARNED, dict[str, str]()
     if path is None:
-        from gpca.model.scan_explainer import explain_scans, repair_scans
-
-        explain = partial(
-            repair_scans if options.repairs_alone else explain_scans,
-            voxel=options.voxel,
-            method=options.method,
-            limit=None if options.tolerance is None else _length(options.tolerance, options.unit),
-            T_target_source=None if options.pose is None else read_pose(options.pose),
-        )
-        if options.estimator or options.uncertainty:
-            explain = partial(explain, estimator=options.estimator or "monte_carlo")
+        explain = _of_scans(options)
     else:
         from gpca.model.explainer import Explainer
         from gpca.model.file import Model
-        from gpca.model.result import DEFAULT, Tolerance
-        from gpca.uncertainty.settings import MONTE_CARLO, UncertaintySettings
 
-        tolerance = Tolerance.parse(options.tolerance) if options.tolerance else DEFAULT
         model = Model.load(path)
         explainer, learned = Explainer(model), f"model {path}: {model.learning}"
-        names["model"] = str(path)
-        extra["trained_on"] = f"{model.title} (procedural stand-in)" if model.stand_in else model.title
-        common = {"method": options.method, "register": options.pose is None, "tolerance": tolerance}
-        explain = partial(explainer.repair, **common)
-        if not options.repairs_alone:
-            explain = partial(
-                explainer.explain,
-                uncertainty=UncertaintySettings() if options.uncertainty or options.estimator else None,
-                estimator=options.estimator or MONTE_CARLO,
-                fast=options.fast,
-                repair=options.repair,
-                **common,
-            )
+        explain = _of_objects(options, explainer)
+        trained_on = f"{model.title} (procedural stand-in)" if model.stand_in else model.title
+        more = {"model": str(path), "trained_on": trained_on}
 
     from gpca.process.progress import progress
 
     statuses = []
-    for place, given in progress(pairs, "pairs", unit=" pairs") if rows else pairs:
-        named = {name: options.pairs.parent / (given[name] or "").strip() for name in COLUMNS} if rows else vars(given)
-        files = {name: printable(named[name]) for name in COLUMNS}
+    for place, named, inputs in progress(pairs, "pairs", unit=" pairs") if rows else pairs:
+        names = {name: printable(named[name]) for name in COLUMNS}
         try:
-            arguments = (inputs_in(given, options) if rows else given).read(read_target)
+            arguments = inputs().read(read_target)
             try:
                 explanation = explain(**arguments)
             except InputError as fault:
-                raise InputError(files["source"], str(fault)) from fault
-            _write(options, explanation, files | names, extra)
+                raise InputError(names["source"], str(fault)) from fault
+            _write(options, explanation, names, more)
             if isinstance(explanation, Explanation):
-                _queue(options.queue, explainer, explanation, " to ".join(files.values()))
+                _queue(options.queue, explainer, explanation, " to ".join(names.values()))
         except InputError as fault:  # with lines of JSON, it is a line of its own, and the others go on
             if not options.json_lines:
                 raise
             statuses.append(FAULTY_STATUS)
-            print(json.dumps(files | {"error": str(fault)}), flush=True)
+            print(json.dumps(names | {"error": str(fault)}), flush=True)
             print(f"gpca {options.command}: {place}{fault}", file=sys.stderr)
         else:
             statuses.append(explanation.status)
     print(learned, file=sys.stderr)
     return FAULTY_STATUS if FAULTY_STATUS in statuses else max(statuses)
+
+
+def _of_scans(options: Namespace) -> Callable[..., ExplainedRegistration]:
+    from gpca.model.scan_explainer import explain_scans, repair_scans
+
+    asked: dict[str, Any] = {}
+    if options.estimator or options.uncertainty:
+        asked["estimator"] = options.estimator or "monte_carlo"
+    return partial(
+        repair_scans if options.repairs_alone else explain_scans,
+        voxel=options.voxel,
+        method=options.method,
+        limit=None if options.tolerance is None else _length(options.tolerance, options.unit),
+        T_target_source=None if options.pose is None else read_pose(options.pose),
+        **asked,
+    )
+
+
+def _of_objects(options: Namespace, explainer: Explainer) -> Callable[..., ExplainedRegistration]:
+    from gpca.model.result import DEFAULT, Tolerance
+    from gpca.uncertainty.settings import MONTE_CARLO, UncertaintySettings
+
+    tolerance = Tolerance.parse(options.tolerance) if options.tolerance else DEFAULT
+    common: dict[str, Any] = {"method": options.method, "register": options.pose is None, "tolerance": tolerance}
+    if options.repairs_alone:
+        return partial(explainer.repair, **common)
+    return partial(
+        explainer.explain,
+        uncertainty=UncertaintySettings() if options.uncertainty or options.estimator else None,
+        estimator=options.estimator or MONTE_CARLO,
+        fast=options.fast,
+        repair=options.repair,
+        **common,
+    )
 
 
 run_repair = run_explain
@@ -302,28 +317,24 @@ def _require_options(options: Namespace) -> None:
         raise InputError("--png", "needs the package matplotlib, which is not installed", "pip install matplotlib")
 
 
-def _write(
-    options: Namespace, explanation: ExplainedRegistration, names: dict[str, str], extra: dict[str, str]
-) -> None:
+def _write(options: Namespace, explanation: ExplainedRegistration, names: dict[str, str], more: dict[str, str]) -> None:
     as_json = options.json or options.json_lines
     # Text contains its warnings.
     warnings = [f"warning: {line}" for line in explanation.warnings] if as_json else []
     for line in (*explanation.notes, *warnings) if not options.pairs else ():
         print(line if len(options.source) == 1 else f"{names['source']}: {line}", file=sys.stderr)
     if as_json:
-        print(json.dumps(explanation.as_dict() | names | extra), flush=options.json_lines)
+        print(json.dumps(explanation.as_dict() | names | more), flush=options.json_lines)
     else:
-        print(explanation.text(), end="")
-    if options.save_pose:
-        explanation.save_pose(options.save_pose)
-        print(f"pose {options.save_pose}", file=sys.stderr)
+        print(explanation.text(options.verbose), end="")
     if options.out and explanation.status:
-        print(f"no pose in {options.out}: none is settled", file=sys.stderr)
-    elif options.out:
-        explanation.save_pose(options.out)
-        print(f"pose {options.out}", file=sys.stderr)
+        print(f"{options.out} is not written: no pose is good or repaired", file=sys.stderr)
+    for path in (options.save_pose, None if explanation.status else options.out):
+        if path:
+            explanation.save_pose(path)
+            print(f"pose {path}", file=sys.stderr)
     if options.html:
-        explanation.save_html(options.html, names)
+        explanation.save_html(options.html, names | {"model": more.get("model", "")})
         print(f"page {options.html}", file=sys.stderr)
     if options.png:
         import_module(FIGURE).draw_explanation(explanation, options.png, f"{names['source']} to {names['target']}")

@@ -28,6 +28,8 @@ UNKNOWN = "unknown"  # state of a pair whose scores mean nothing
 LIKELY = 0.5  # probability from which a concept is named as a cause
 SMALLEST = 1e-9  # least probability of a cause
 IN_WORDS = {SEVERAL: "several causes"}
+AS_FAR = "initial poses this far off"
+NO_GUARANTEE = "guarantee none: a fast explanation, an unusual tolerance, or a model without one"
 SMALL_TURN_DEG = 3.0  # smaller rotations are not mentioned
 CHECK = "check"  # action for a pair whose scores mean nothing
 RERUN = "rerun"  # action where the re-enactment knows a better pose
@@ -40,10 +42,10 @@ ADVICE = {  # per branch of the policy
     NOTHING: "none",
     "reinitialize": "reinitialize ICP with a broader search",
     "new_view": "change the viewpoint",
-    "denoise": "filter and check the sensor",
+    "denoise": "filter the source and check the sensor",
     CHECK: "check what was given",
-    RERUN: "rerun from pose 1",
-    TAKE: "take the repaired pose",
+    RERUN: "run 'gpca repair' with the same files, or start again from pose 1 (--save-pose writes it)",
+    TAKE: "use the repaired pose (--save-pose writes it)",
     REFINE: "register from this pose",
     RESCALE: "rescale the source, or check the units",
     QUEUE: "queue for labeling, so that the cause can be learned",
@@ -54,6 +56,12 @@ def plain(items: Sequence[tuple[str, Any]]) -> dict[str, Any]:
     """Return the fields of a dataclass for JSON: arrays and tuples as lists."""
     values = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in items}
     return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
+
+
+def result_line(probability: float, limit: float, share: float, unit: str) -> str:
+    """One line of text on how probably a pose is off by more than a limit, which is a share of the diameter."""
+    above = f"{in_decimals(limit)} {unit} ({100 * share:.2g}% of the diameter)"
+    return f"result    probability {probability:.2f} of an error above {above}"
 
 
 def outside(part: Any, frame: CanonicalFrame, T_target_source_init: np.ndarray) -> Any:
@@ -104,22 +112,30 @@ class Guaranteed:
     def lines(self) -> list[str]:
         """Return lines of text."""
         states = " or ".join(IN_WORDS.get(state, state) for state in self.states)
-        risk = {
-            GOOD: f"at most {self.missed:.0%} of the failures are called so",
-            ALARM: f"at most {self.false_alarms:.0%} of the good ones are called so",
-        }
-        why = risk.get(self.call, "neither call keeps its promise here")
-        lines = [
-            f"set       {states} (in {self.level:.0%} of cases, such a set contains the true state)",
-            f"alarm     {self.call} ({why})",
+        name, (answer, risk) = f"{self.level:.0%} set", self.alarm
+        return [
+            f"{name:10}{states} ({self.level:.0%} of such sets contain the true state)",
+            f"alarm     {answer} ({risk})",
+            f"guarantee of both: calibrated {self.basis}",
         ]
-        return [*lines, f"promise   {self.basis}"] if self.labeled else lines
+
+    @property
+    def alarm(self) -> tuple[str, str]:
+        """Whether the failure alarm is raised, and how often that is wrong, in words."""
+        if self.call == ALARM:
+            return "raised", f"at most {self.false_alarms:.0%} of good registrations raise it"
+        if self.call == GOOD:
+            return "not raised", f"at most {self.missed:.0%} of failures do not raise it"
+        return self.call, "neither answer would keep its bound on errors here"
 
     @property
     def basis(self) -> str:
-        """The labeled registrations that the promise holds for, in words."""
+        """What was used for calibration, and what the guarantee holds for, in words."""
+        if not self.labeled:
+            shapes = f"{self.families} unseen families of shapes" if self.families else "unseen objects"
+            return f"on {shapes}, for objects like these"
         groups = f"of {self.families} groups, for a new group" if self.families else "for others like these"
-        return f"by {self.samples} labeled registrations {groups}"
+        return f"on {self.samples} labeled registrations {groups}"
 
 
 def state_probabilities(causes_N_3: np.ndarray, result_N: np.ndarray) -> np.ndarray:
@@ -172,14 +188,12 @@ class FittingPose:
             **more,
         )
 
-    def words(self, unit: str, fits: str) -> str:
-        """Describe the pose relative to the result, after the verb `fits`."""
+    def words(self, unit: str) -> str:
+        """Say how far the pose is from the result."""
         if self.registered:
-            return f"{fits} as registered, within {in_decimals(self.apart)} {unit}"
-        if self.turn_deg < SMALL_TURN_DEG:
-            return f"{fits} moved by {in_decimals(self.shift)} {unit}"
-        turn = f"turned by {self.turn_deg:.0f}° about {axis_in_words(self.axis)}"
-        return f"{fits} {turn}, {in_decimals(self.shift)} {unit} away"
+            return f"the registered pose, within {in_decimals(self.apart)} {unit}"
+        turn = f"{self.turn_deg:.0f}° about {axis_in_words(self.axis)} and " * (self.turn_deg >= SMALL_TURN_DEG)
+        return f"{turn}{in_decimals(self.shift)} {unit} away from the registered pose"
 
 
 @dataclass(frozen=True)
@@ -233,13 +247,8 @@ class Reenacted:
         first = self.poses[0]
         return None if first.registered or first.probability < SURE else first
 
-    def words(self, subject: str, unit: str) -> list[str]:
-        """Describe each hypothesis relative to the result, such as ``the object also fits moved by 20 mm``."""
-        verbs = ["fits", *["also fits"] * (len(self.poses) - 1)]
-        return [f"{subject} {pose.words(unit, fits)}" for fits, pose in zip(verbs, self.poses, strict=True)]
-
     def noise_words(self, unit: str) -> str:
-        """The noise per axis, or what it is below."""
+        """The standard deviation of the noise per axis, or what it is below."""
         if self.noise <= self.noise_floor:
             return f"below {in_decimals(self.noise_floor)} {unit}"
         return f"{in_decimals(self.noise)} {unit}"
@@ -247,12 +256,13 @@ class Reenacted:
     def effects_line(self, unit: str) -> str:
         """One line of text on the effects of the causes."""
         effects = ", ".join(f"{cause} {in_decimals(effect)}" for cause, effect in self.effects.items())
-        return f"effects   on the re-enacted error of {in_decimals(self.error)} {unit}: {effects}"
+        error = f"{in_decimals(self.error)} {unit}"
+        return f"effects   {effects} {unit} (Shapley shares of the re-enacted error, {error})"
 
-    def pose_lines(self, subject: str, unit: str) -> list[str]:
+    def pose_lines(self, unit: str) -> list[str]:
         """One line of text per hypothesis."""
-        poses = zip(self.words(subject, unit), self.poses, strict=True)
-        return [f"pose {k}    {words}: probability {pose.probability:.2f}" for k, (words, pose) in enumerate(poses, 1)]
+        poses = enumerate(self.poses, 1)
+        return [f"pose {k}    probability {pose.probability:.2f}: {pose.words(unit)}" for k, pose in poses]
 
     @property
     def caveat(self) -> str:
@@ -266,9 +276,9 @@ class Reenacted:
 
     def lines(self, unit: str) -> list[str]:
         """Lines of text."""
-        parts = f"{self.outliers:.0%} outliers, {self.missing:.0%} of the surface missing"
-        observed = f"observed  noise {self.noise_words(unit)}, {parts}"
-        return [self.effects_line(unit), observed, *self.fit_lines(unit), *self.pose_lines("the object", unit)]
+        parts = f"{self.outliers:.0%} outliers; {self.missing:.0%} of the target unseen"
+        observed = f"observed  noise σ {self.noise_words(unit)} per axis, {parts}"
+        return [observed, *self.fit_lines(unit), *self.pose_lines(unit)]
 
 
 @dataclass(frozen=True)
@@ -323,7 +333,7 @@ class Diagnosis:
         if self.start < self.start_threshold:
             return self.statement
         right = f"this result is {'probably ' * self.doubtful}right"
-        return f"{right}, but registrations from such starts often fail: start closer or search more broadly"
+        return f"{right}, but registrations from {AS_FAR} often fail: start closer or search more broadly"
 
     @property
     def named(self) -> tuple[str, ...]:
@@ -347,17 +357,22 @@ class Diagnosis:
             "caveat": self.reenacted.caveat,
         }
 
-    def lines(self, unit: str) -> list[str]:
-        """Lines of text, with lengths in this unit."""
-        limit = f"{in_decimals(self.tolerance)} {unit} ({100 * self.tolerance_share:.2g} % of the diameter)"
+    def lines(self, unit: str, verbose: bool) -> list[str]:
+        """Lines of text, with lengths in this unit; `verbose` also tells causes and effects of a good result."""
         odd = (self.result >= LIKELY) != (self.result >= self.threshold)  # as few good ones are to be called failed
-        called = f"; only from {self.threshold:.2f} on is it called failed" * (odd and self.threshold <= 1)
+        called = f"; failed from {self.threshold:.2f} on" * (odd and self.threshold <= 1)
+        causes = ", ".join(f"{cause} {share:.2f}" for cause, share in self.causes.items())
+        why = [
+            f"causes    {causes} (probabilities if it failed; several can act at once)",
+            self.reenacted.effects_line(unit),
+        ]
         return [
             f"state     {'probably ' * self.doubtful}{self.state}: {self.statement}",
-            f"result    probability {self.result:.2f} that the pose is off by more than {limit}{called}",
-            f"start     registrations from such starts fail with probability {self.start:.2f}",
-            *(self.guarantee.lines() if self.guarantee else ["set       none, since nothing is promised"]),
-            f"causes    {', '.join(f'{cause} {share:.3f}' for cause, share in self.causes.items())}, if it failed",
-            f"error     about {in_decimals(self.expected_error)} {unit}",
+            result_line(self.result, self.tolerance, self.tolerance_share, unit) + called,
+            f"error     about {in_decimals(self.expected_error)} {unit} expected (mean distance of the points from "
+            "their true places)",
+            f"start     registrations from {AS_FAR} fail with probability {self.start:.2f}",
+            *(self.guarantee.lines() if self.guarantee else [NO_GUARANTEE]),
+            *(why if verbose or self.doubtful or self.state == FAILED else []),
             *self.reenacted.lines(unit),
         ]

@@ -20,7 +20,7 @@ from gpca.classifier.scores import entropy
 from gpca.errors import InputError
 from gpca.model.clouds import Clouds, voids_of
 from gpca.model.diagnoser import QUICK_HYPOTHESES, QUICK_POINTS
-from gpca.model.diagnosis import CHECK, REFINE, RERUN, RESCALE, TAKE, Diagnosis, outside
+from gpca.model.diagnosis import AS_FAR, CHECK, REFINE, RERUN, RESCALE, TAKE, Diagnosis, outside
 from gpca.model.explanation import GIVEN, Explanation, Motion, PoseSpread
 from gpca.model.file import Model
 from gpca.model.location import model_path
@@ -119,9 +119,11 @@ class Explainer:
                 by, found = method if register else GIVEN, () if fast else enactments
                 repaired = Repair.of(self.model, clouds, outcome, by, limit, unit, found)
         if repaired is not None and repaired.verdict == REPAIRED and not diagnosis.wrong_scale:
-            decision = Decision(TAKE, "", repaired.reason)
+            before = f"the registered one with {repaired.registered_result:.2f}"
+            decision = Decision(TAKE, "", f"it is wrong with probability {repaired.result:.2f}, {before}")
         elif voids:
-            decision = Decision(CHECK, "", ", ".join(voids.values()))
+            checks = ", ".join(voids.values())
+            decision = Decision(CHECK, "", f"the numbers mean nothing until these are checked: {checks}")
         elif diagnosis.state == NOMINAL:
             decision = Decision(NOTHING, "", diagnosis.remark)
         else:
@@ -227,9 +229,9 @@ class Explainer:
         if bad_start and decision.action == QUEUE:
             return decision
         if better := diagnosis.reenacted.better:
-            return Decision(RERUN, "", f"it fits with probability {better.probability:.2f}; --save-pose writes it")
+            return Decision(RERUN, "", f"pose 1 fits with probability {better.probability:.2f}")
         if not registered and not bad_start:
-            return Decision(REFINE, "", f"registrations from such starts fail with probability {diagnosis.start:.2f}")
+            return Decision(REFINE, "", f"registrations from {AS_FAR} fail with probability {diagnosis.start:.2f}")
         return decision
 
     def _registered(

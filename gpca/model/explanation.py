@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from html import escape
 from pathlib import Path
-from typing import ClassVar
+from textwrap import wrap
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from gpca.rigid import as_rows, log
 
 NOT_SURE = "not sure"
 UNKNOWN_STATUS = 3  # exit code of the command if an explanation means nothing; 1 is a failed check, 2 a bad input
+WIDTH = 100  # of text, characters
 GIVEN = "given"  # method of a pose that was not registered but judged
 LEARNED = (
     "the probability of a failure was fitted to scans of development scenes (docs/real_world.md); the model, which "
@@ -32,8 +34,14 @@ HEADS = {  # CSS class and title of a state
     FAILED: ("bad", "This registration has probably failed"),
     NOT_SURE: ("doubt", "This registration may have failed"),
 }
-PAPER = "GP-CA as in the paper: it sees the aligned source alone and names a concept even where nothing is wrong"
+PAPER = "GP-CA as in the paper (sees the aligned source alone; names a concept even where nothing is wrong)"
 SCANS_WITHOUT = {"noise": "smoothed points", "pose": "right start", "overlap": "common parts alone"}
+
+
+def wrapped(lines: Iterable[str]) -> list[str]:
+    """Break long lines of text between words; what follows stands under the text, not under its label."""
+    whole: dict[str, Any] = {"break_long_words": False, "break_on_hyphens": False, "subsequent_indent": 10 * " "}
+    return [part for line in lines for part in wrap(line, WIDTH, **whole) or [""]]
 
 
 @dataclass(frozen=True)
@@ -69,11 +77,11 @@ class PoseSpread:
         """Root mean square length, in the unit of the points."""
         return self.diameter * math.sqrt(np.trace(self.covariance_6_6[3:, 3:]))
 
-    def line(self, unit: str) -> str:
-        """One line of text."""
-        scatter = f"{self.rotation_deg:.2f}°, {in_decimals(self.translation, 4)} {unit}"
-        by = f"over {self.starts} starts" if self.starts else f"by {self.estimator}"
-        return f"pose spread    {scatter} (root mean square {by})"
+    def line(self, unit: str, by: str = "") -> str:
+        """One line of text, with what it was estimated by."""
+        by = by or (f"over {self.starts} starts" if self.starts else f"by {self.estimator}")
+        rotation, shift = in_decimals(self.rotation_deg), in_decimals(self.translation)
+        return f"spread    pose uncertainty (RMS) {rotation}° and {shift} {unit}, {by}"
 
     def as_dict(self) -> dict[str, object]:
         """Values for JSON."""
@@ -86,7 +94,7 @@ class ExplainedRegistration:
     """What is reported of any registration: its result, what to do next, and how it is shown."""
 
     html: ClassVar[Callable[..., str]]
-    lines: ClassVar[Callable[..., list[str]]]  # what was found, as text
+    lines: ClassVar[Callable[..., list[str]]]  # what was found, as text; all of it if verbose
     text: ClassVar[Callable[..., str]]  # the same, as a report for a reader
 
     T_target_source: np.ndarray  # (4, 4) the resulting pose, in the unit of the points
@@ -113,6 +121,10 @@ class ExplainedRegistration:
     def advice(self) -> str:
         """What to do next, in words."""
         return ADVICE.get(self.action, self.action)
+
+    def action_lines(self) -> list[str]:
+        """Lines of text on what to do next, and why."""
+        return [f"action    {self.advice}", f"reason    {self.reason}"]
 
     def as_dict(self) -> dict[str, object]:
         """Values for JSON."""
@@ -149,18 +161,18 @@ class ExplainedRegistration:
         farthest = sum(map(np.linalg.norm, (frame.center_3, shift_3))) + frame.diameter
         return as_rows(T_target_source, float(farthest / frame.diameter))
 
-    def _report(self, body: Sequence[str], registration: str, *end: str) -> str:
-        warnings = [f"warning   {line}" for line in self.warnings]
+    def _report(self, body: Sequence[str], fit: str, *end: str) -> str:
+        lines = [*(f"warning   {line}" for line in self.warnings), *body, "", f"method    {self.method}: {fit}"]
+        if self.spread is not None:
+            lines.append(self.spread.line(self.unit))
+        if self.moved:
+            distance = page.length(self.moved.distance, self.unit)
+            lines.append(f"moved     {self.moved.rotation_deg:.3g}° and {distance} from the initial pose")
         pose = ["", f"T_target_source, in {self.unit}", *self.pose_rows(self.T_target_source)]
         if self.fitting_pose is not self.T_target_source:
             name = "the repaired pose" if self.action == TAKE else "pose 1"
             pose += ["", f"{name} as T_target_source, which --save-pose writes", *self.pose_rows(self.fitting_pose)]
-        if self.spread is not None:
-            registration += f"\n{self.spread.line(self.unit)}"
-        if self.moved:
-            distance = page.length(self.moved.distance, self.unit)
-            registration += f"\nmoved          {self.moved.rotation_deg:.3g}° and {distance} from the initial pose"
-        return "\n".join([*warnings, *body, "", f"registration   {self.method}, {registration}", *pose, *end, ""])
+        return "\n".join([*wrapped(lines), *pose, *wrapped(end), ""])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -210,7 +222,7 @@ class Explanation(ExplainedRegistration):
         elif not self.unknown:
             body += [page.promise(self.diagnosis.guarantee), page.causes(self.diagnosis, self.unit)]
             if scene:
-                body.append(page.poses(self.diagnosis.reenacted, "the object", self.unit, observation=True))
+                body.append(page.poses(self.diagnosis.reenacted, self.unit, observation=True))
         body += [
             page.counterfactuals(scene, self.unit) if scene else "",
             "" if self.unknown else page.as_in_the_paper(explained),
@@ -221,27 +233,26 @@ class Explanation(ExplainedRegistration):
         head = page.headline(explained) + page.warnings(self.warnings)
         return page.assembled("Registration explained", head, body, scene, self.unit)
 
-    def lines(self) -> list[str]:
+    def lines(self, verbose: bool = False) -> list[str]:
         """Return what was found, as text."""
-        action = [f"action    {self.advice} ({self.reason})", *(self.repaired.lines() if self.repaired else [])]
-        if self.unknown:
-            return [f"state     {UNKNOWN}", *action]
-        return [
-            *self.diagnosis.lines(self.unit),
-            *action,
-            "",
-            PAPER,
-            *(f"warning   {line}" for line in self.gpca_warnings),
-            f"{'':10}{'score':>8}{'variance':>10}",
-            *(f"{name:10}{self.scores[name]:8.3f}{self.variances[name]:10.4f}" for name in self.scores),
-            f"entropy {self.entropy:.3f} nats, BALD {self.bald:.3f} nats",
-        ]
+        state = [f"state     {UNKNOWN}"] if self.unknown else self.diagnosis.lines(self.unit, verbose)
+        repaired = ["", *self.repaired.lines(verbose)] if self.repaired else []
+        if verbose and not self.unknown:
+            repaired += [
+                "",
+                PAPER,
+                *(f"warning   {line}" for line in self.gpca_warnings),
+                f"{'':10}{'score':>8}{'variance':>10}",
+                *(f"{name:10}{self.scores[name]:8.3f}{self.variances[name]:10.4f}" for name in self.scores),
+                f"entropy {self.entropy:.3f} nats, BALD {self.bald:.3f} nats",
+            ]
+        return [*state, *self.action_lines(), *repaired]
 
-    def text(self) -> str:
-        """Return a report for a reader."""
-        fit = f"fitness {self.fitness:.3f}, inlier RMSE {in_decimals(self.inlier_rmse, 4)} {self.unit}"
-        stages = ", ".join(f"{stage} {1e3 * seconds:.1f}" for stage, seconds in self.seconds.items())
-        return self._report(self.lines(), fit, "", f"milliseconds   {stages}")
+    def text(self, verbose: bool = False) -> str:
+        """Return a report for a reader; `verbose` adds causes of a good result, scores of GP-CA and durations."""
+        fit = f"fitness {self.fitness:.3f}, inlier RMSE {page.length(self.inlier_rmse, self.unit)}"
+        stages = ", ".join(f"{stage} {1e3 * seconds:.0f}" for stage, seconds in self.seconds.items())
+        return self._report(self.lines(verbose), fit, *(["", f"ms        {stages}"] if verbose else []))
 
 
 @dataclass(frozen=True)
@@ -271,24 +282,24 @@ class ScanExplanation(ExplainedRegistration):
     def _poses(self) -> Sequence[FittingPose]:
         return self.reenacted.poses
 
-    def lines(self) -> list[str]:
+    def lines(self, verbose: bool = False) -> list[str]:
         """Return what was found, as text."""
         limit = page.length(self.limit, self.unit)
+        why = [f"causes    {self._named()}", self.reenacted.effects_line(self.unit)]
         return [
             f"state     {self.state}" + (f", but {caveat}" if (caveat := self.reenacted.caveat) else ""),
-            f"failure   probability {self.failure:.2f} of an error above {limit}",
-            f"causes    {self._named()}",
+            f"result    probability {self.failure:.2f} of an error above {limit} (RMS over the common surface)",
             f"overlap   {self._overlap()}",
-            self.reenacted.effects_line(self.unit),
+            *(why if verbose or self.state != NOMINAL else []),
             *self.reenacted.fit_lines(self.unit),
-            *self.reenacted.pose_lines("the source", self.unit),
-            f"action    {self.advice} ({self.reason})",
+            *self.reenacted.pose_lines(self.unit),
+            *self.action_lines(),
         ]
 
-    def text(self) -> str:
-        """Return a report for a reader."""
+    def text(self, verbose: bool = False) -> str:
+        """Return a report for a reader; `verbose` adds causes and effects of a good result."""
         rmse, voxel = (page.length(value, self.unit) for value in (self.inlier_rmse, self.voxel))
-        return self._report(self.lines(), f"fitness {self.fitness:.3f}, inlier RMSE {rmse}, voxels of {voxel}")
+        return self._report(self.lines(verbose), f"fitness {self.fitness:.3f}, inlier RMSE {rmse}, voxels of {voxel}")
 
     def html(self, names: Mapping[str, str] | None = None) -> str:
         """Return a page that needs no other file, as :meth:`Explanation.html` does."""
@@ -301,7 +312,7 @@ class ScanExplanation(ExplainedRegistration):
             page.action(explained, self.advice),
             page.section("Overlap", f"<p>{escape(self._overlap())}.</p>"),
             page.section("Causes", f"<p>{escape(self._named())}.</p>") if self.causes else "",
-            page.poses(self.reenacted, "the source", self.unit),
+            page.poses(self.reenacted, self.unit),
             page.counterfactuals(scene, self.unit, SCANS_WITHOUT, "errors from this one start") if scene else "",
             page.details(explained, inputs, self.pose_rows(self.T_target_source)),
         ]

@@ -1,5 +1,6 @@
 """Draws one explanation in one look: both clouds, the causes, what would have been without them, and what to do."""
 
+from dataclasses import replace
 from pathlib import Path
 from textwrap import wrap
 
@@ -8,7 +9,6 @@ import numpy as np
 from gpca.causes.truth import BY_SIZE, SUBSETS
 from gpca.model.explanation import Explanation
 from gpca.model.scene import Scene, taken_out
-from gpca.numerals import in_decimals
 from gpca.reporting.figures import style
 from gpca.reporting.figures.cloud_views import thinned, widest_views
 from gpca.rigid import transform
@@ -20,6 +20,8 @@ OUTSIDE = 0.01  # share of the points after the registration that the panels may
 LETTERS = 46  # in a line of text
 MOST_LINES = 12
 Views = list[tuple[str, np.ndarray]]  # title, cloud
+SHOWN = ("state", "result", "alarm", "action")  # labels of lines, beside that of the set
+WITHOUT = {"noise": "without noise", "pose": "with the right start", "overlap": "with full overlap"}
 ROWS = [subset for subset in BY_SIZE if len(SUBSETS[subset]) in (0, 2, 3)]  # all causes, one of them gone, none
 
 
@@ -55,9 +57,10 @@ def _views(explanation: Explanation, scene: Scene) -> Views:
     if scene.T_repaired is not None:
         return [*views, ("repaired", transform(scene.T_repaired, scene.source))]
     if not explanation.unknown:
-        poses = zip(explanation.diagnosis.reenacted.poses, scene.possibilities, strict=True)
-        for other in [possibility for pose, possibility in poses if not pose.registered][:1]:  # the most probable
-            views.append((f"another pose (probability {other.probability:.2f})", transform(other.T, scene.source)))
+        poses = enumerate(zip(explanation.diagnosis.reenacted.poses, scene.possibilities, strict=True), 1)
+        for k, other in [(k, possibility) for k, (pose, possibility) in poses if not pose.registered][:1]:
+            title = f"pose {k} (probability {other.probability:.2f})"  # the most probable
+            views.append((title, transform(other.T, scene.source)))
     return views
 
 
@@ -93,24 +96,23 @@ def _draw_causes(panel, explanation: Explanation) -> None:
     place_C = np.arange(len(shares))[::-1]
     panel.barh(place_C, share_C, xerr=spread_2_C, color=colors, height=0.6, error_kw={"elinewidth": 0.8})
     panel.set_yticks(place_C, [*shares])
-    panel.set(xlim=(0, 1.02), xlabel="probability of a cause, if it failed")
+    panel.set(xlim=(0, 1.02), xlabel="probability, if it failed", title="causes")
 
 
 def _draw_what_ifs(panel, scene: Scene, unit: str) -> None:
     errors = [scene.frame.diameter * scene.possibilities[0].errors[subset] for subset in ROWS]
     panel.barh(np.arange(len(errors)), errors, color=style.BLUE, height=0.6)
-    panel.axvline(scene.limit * scene.frame.diameter, color=style.VERMILION, linewidth=0.8)
-    words = ["All of these" if not SUBSETS[subset] else taken_out(subset) for subset in ROWS]
+    limit = scene.limit * scene.frame.diameter
+    panel.axvline(limit, color=style.VERMILION, linewidth=0.8)
+    label = {"color": style.VERMILION, "fontsize": style.SMALL_PT, "va": "center"}
+    label["ha"] = "left" if limit < max(errors) / 2 else "right"
+    panel.text(limit, len(errors) - 0.3, " tolerance ", **label)
+    words = ["with all three" if not SUBSETS[subset] else taken_out(subset, WITHOUT).lower() for subset in ROWS]
     panel.set_yticks(np.arange(len(errors)), words)
-    panel.set_xlabel(f"re-enacted error ({unit})")
+    panel.set(xlabel=f"re-enacted error ({unit})", title="error that would remain", ylim=(-0.5, len(errors) + 0.1))
 
 
 def _lines(explanation: Explanation) -> list[str]:
-    diagnosis, lines = explanation.diagnosis, ["state: unknown"]
-    if not explanation.unknown:
-        tolerance = f"{in_decimals(diagnosis.tolerance)} {explanation.unit}"
-        off = f"off by more than {tolerance} with probability {diagnosis.result:.2f}"
-        lines = [f"{diagnosis.state}: {diagnosis.statement}", off]
-        lines += [" ".join(line.split()) for line in (diagnosis.guarantee.lines() if diagnosis.guarantee else [])]
-    lines.append(f"action: {explanation.advice} ({explanation.reason})")
-    return lines + [f"warning: {warning}" for warning in explanation.warnings]
+    lines = [(line[:10].strip(), line[10:]) for line in replace(explanation, repaired=None).lines()]
+    shown = [f"{label}: {text}" for label, text in lines if label in SHOWN or label.endswith("set")]
+    return shown + [f"warning: {warning}" for warning in explanation.warnings]

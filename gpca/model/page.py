@@ -10,7 +10,7 @@ from gpca.causes.policy import NOTHING
 from gpca.causes.truth import BY_SIZE, FAILED
 from gpca.evaluation.conformal import ALARM, GOOD
 from gpca.guarantee.guarantee import STATES, WHETHER_FAILED
-from gpca.model.diagnosis import IN_WORDS, UNKNOWN, Diagnosis, Guaranteed, Reenacted
+from gpca.model.diagnosis import AS_FAR, IN_WORDS, UNKNOWN, Diagnosis, Guaranteed, Reenacted
 from gpca.model.scene import ASSETS, WITHOUT, Scene, taken_out
 from gpca.numerals import in_decimals
 
@@ -59,7 +59,7 @@ def headline(explained: Mapping) -> str:
     tolerance, error = (length(diagnosis[name], explained["unit"]) for name in ("tolerance", "expected_error"))
     chance = f"The pose is off by more than {tolerance} with probability {diagnosis['result']:.2f}"
     called = f"called failed from {diagnosis['threshold']:.2f} on; expected error {error}"
-    start = f"Registrations from such starts fail with probability {diagnosis['start']:.2f}"
+    start = f"Registrations from {AS_FAR} fail with probability {diagnosis['start']:.2f}"
     return f"{line}<p>{chance}, {called}. {start}.</p>"
 
 
@@ -86,25 +86,14 @@ def promise(guarantee: Guaranteed | None) -> str:
         f'<li class="{"in" if state in guarantee.states else "out"}">{escape(IN_WORDS.get(state, state))}</li>'
         for state in (WHETHER_FAILED if FAILED in guarantee.states else STATES)
     )
-    counted = (
-        f"It was calibrated {guarantee.basis}."
-        if guarantee.labeled
-        else f"It was calibrated on {guarantee.families} families of shapes that the classifier had not learned, and "
-        "holds for objects that differ from these no more than these differ among themselves."
-        if guarantee.families
-        else "It was calibrated on single registrations of objects that the classifier had not learned."
-    )
-    risks = {
-        GOOD: f"At most {guarantee.missed:.0%} of all failures are called good.",
-        ALARM: f"At most {guarantee.false_alarms:.0%} of all good registrations are called failed.",
-    }
-    risk = risks.get(guarantee.call, "Neither “good” nor “failed” would keep its promise here.")
-    call = f'<span class="call {CALLS.get(guarantee.call, "doubt")}">{escape(guarantee.call)}</span>'
+    answer, risk = guarantee.alarm
+    call = f'<span class="call {CALLS.get(guarantee.call, "doubt")}">{answer}</span>'
     return section(
         "What is guaranteed",
         f'<ul class="chips" aria-label="Set of states">{chips}</ul>'
-        f"<p>The true state is one of those marked: {guarantee.level:.0%} of such sets contain it. {counted}</p>"
-        f"<p>Failure alarm: {call}. {risk}</p>",
+        f"<p>The true state is one of those marked: {guarantee.level:.0%} of such sets contain it. It was calibrated "
+        f"{guarantee.basis}.</p>"
+        f"<p>Failure alarm: {call}. {sentence(risk)}.</p>",
     )
 
 
@@ -115,22 +104,23 @@ def causes(diagnosis: Diagnosis, unit: str) -> str:
     )
     note = (
         "Probability that each is a cause, if the registration failed, ± the standard deviation of the posterior; "
-        "on the right, what it adds to the re-enacted error."
+        "several can act at once. On the right, its Shapley share of the re-enacted error."
     )
     return section("Causes", f'{"".join(bars)}<p class="note">{note}</p>')
 
 
-def poses(reenacted: Reenacted, subject: str, unit: str, *, observation: bool = False) -> str:
+def poses(reenacted: Reenacted, unit: str, *, observation: bool = False) -> str:
     items = "".join(
-        f'<li><button type="button" data-view="pose:{k}">Pose {k + 1}</button> <span>{sentence(words)}</span>'
+        f'<li><button type="button" data-view="pose:{k}">Pose {k + 1}</button> '
+        f"<span>{sentence(pose.words(unit))}</span>"
         f'<span class="share"><span class="bar"><i style="width:{100 * pose.probability:.1f}%"></i></span>'
         f"<span>{pose.probability:.2f}</span></span></li>"
-        for k, (words, pose) in enumerate(zip(reenacted.words(subject, unit), reenacted.poses, strict=True))
+        for k, pose in enumerate(reenacted.poses)
     )
     note = (
-        f'<p class="note">Under pose 1, the noise is {escape(reenacted.noise_words(unit))} per axis, '
-        f"{reenacted.outliers:.0%} of the points are outliers, and {reenacted.missing:.0%} of the surface was not "
-        "seen.</p>"
+        f'<p class="note">Under pose 1, the noise is {escape(reenacted.noise_words(unit))} per axis (standard '
+        f"deviation), {reenacted.outliers:.0%} of the source are outliers, and {reenacted.missing:.0%} of the target "
+        "is unseen.</p>"
     )
     return section("Poses that fit", f'<ol class="poses">{items}</ol>{note if observation else ""}')
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
@@ -15,8 +15,8 @@ from gpca.causes.settings import OBSERVED
 from gpca.guarantee.acceptance import WRONG
 from gpca.model import page, repair
 from gpca.model.clouds import FEWEST_MATCHES, Clouds, voids_of
-from gpca.model.diagnosis import CHECK, TAKE, UNKNOWN, FittingPose, outside
-from gpca.model.explanation import GIVEN, UNKNOWN_STATUS, ExplainedRegistration, PoseSpread
+from gpca.model.diagnosis import CHECK, TAKE, UNKNOWN, FittingPose, outside, result_line
+from gpca.model.explanation import GIVEN, UNKNOWN_STATUS, ExplainedRegistration, PoseSpread, wrapped
 from gpca.model.file import Model
 from gpca.model.repair import GOOD, NOT_REPAIRED, REPAIRED, SEVERAL, Part, Proposals, Verdict
 from gpca.model.result import level_at
@@ -35,15 +35,17 @@ STATUSES = {GOOD: 0, REPAIRED: 0, UNKNOWN: UNKNOWN_STATUS, NOT_REPAIRED: 4, SEVE
 ACTIONS = {GOOD: NOTHING, REPAIRED: TAKE}  # for the others, `CHECK`
 TONES = {GOOD: "good", REPAIRED: "good", NOT_REPAIRED: "bad"}  # CSS classes; for the others, "doubt"
 LOST = "the registration ended away from the target: poses were sought anywhere, and nothing is promised"
+NOT_CALIBRATED = "none: the model was not calibrated on such repairs"
 SURFACE = "surface"  # estimator of the spread: how the surface holds the points that were seen
 ALONG = 0.95  # cosine of the angle to an axis within which that axis names a direction
 
 
 def side_in_words(direction: Sequence[float]) -> str:
+    """Describe where a part of the target lies, after `target`."""
     along = int(np.argmax(np.abs(direction)))
     if abs(direction[along]) >= ALONG:
-        return f"the target's {'+' if direction[along] > 0 else '-'}{'xyz'[along]} side"
-    return f"the side toward ({', '.join(f'{part:.2f}' for part in direction)}) in the target's frame"
+        return f"on its {'+' if direction[along] > 0 else '-'}{'xyz'[along]} side"
+    return f"toward ({', '.join(f'{part:.2f}' for part in direction)}) in its frame"
 
 
 @dataclass(frozen=True)
@@ -56,12 +58,12 @@ class OtherPose(FittingPose):
 
     def line(self, number: int, unit: str) -> str:
         """One line of text."""
-        words = self.words(unit, "fits")
-        text = f"pose {number}    {words}: probability {self.probability:.2f}; alone, off with {self.off:.2f}"
+        probability = f"probability {self.probability:.2f}, wrong with {self.off:.2f} if judged alone"
+        text = f"pose {number}    {probability}: {self.words(unit)}"
         if self.differs is None:
             return text
-        part = f"{self.differs.share:.0%} of the target, on {side_in_words(self.differs.direction)}"
-        return f"{text}; {part}, tells it from pose 1, by {in_decimals(self.differs_by)} {unit}"
+        part = f"{self.differs.share:.0%} of the target, {side_in_words(self.differs.direction)}"
+        return f"{text}; differs from pose 1 by {in_decimals(self.differs_by)} {unit} on {part}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,9 +106,10 @@ class Repair(ExplainedRegistration):
         diagnoser, tolerance, T_registered = model.diagnoser, limit / frame.diameter, frame.pose_outside(T) @ T_init
         voids = voids_of(clouds.source, clouds.target, 1.0, model.familiar)
         lost = round(outcome.fitness * len(clouds.source)) < FEWEST_MATCHES
+        level = level_at(diagnoser.levels, tolerance)
         unusual, _ = model.familiar.warnings(clouds.source, clouds.target)
         scene = Scene(clouds.source, clouds.target, T, frame, model.icp.correspondence_distance, tolerance)
-        unrepaired = cls(
+        repaired = cls(
             T_target_source=T_registered,
             T_registered=T_registered,
             fitness=outcome.fitness,
@@ -116,12 +119,13 @@ class Repair(ExplainedRegistration):
             unit=unit,
             tolerance=limit,
             tolerance_share=tolerance,
+            wrong=None if voids or lost or level.repaired_below is None else WRONG,
             warnings=(*voids, *((LOST,) if lost else ()), *unusual),
             learned_from=model.learning,
             scene=scene,
         )
         if voids:
-            return unrepaired
+            return repaired
         pair = diagnoser.pair(clouds.source, clouds.target, T, method != GIVEN)
         surface, before = ModelSurface(pair.model), transform(pair.T_init, pair.observed)
         refine: repair.Refine = repair.unrefined
@@ -140,7 +144,6 @@ class Repair(ExplainedRegistration):
             hypotheses = repair.search(pair, diagnoser.reenactment, surface)
         proposals = repair.propose(clouds.source, surface, T, *hypotheses, refine, measure)
         proposals.evidence.fitness_N[0], proposals.evidence.inlier_rmse_N[0] = pair.fitness_n[0], pair.inlier_rmse_n[0]
-        level = level_at(diagnoser.levels, tolerance)
         described_F = None if method == GIVEN else described(pair, diagnoser.runs.icp)
         verdict = repair.decide(diagnoser.judge, level, proposals, tolerance, lost, described_F)
         errors_n = diagnoser.judge.error(proposals.evidence)
@@ -150,18 +153,10 @@ class Repair(ExplainedRegistration):
             outliers, missing = repair.unseen(clouds.source, surface, T_best)
             free = undetermined_at(transform(T_best, before), surface)
             spread = PoseSpread(free.covariance, frame.diameter, SURFACE, None)
-            more: dict[str, Any] = {
-                "outliers": outliers,
-                "missing": missing,
-                "free": free.outside(frame),
-                "spread": spread,
-            }
-            unrepaired = replace(unrepaired, **more)
+            repaired = replace(repaired, outliers=outliers, missing=missing, free=free.outside(frame), spread=spread)
         if verdict.row:
             _, (fitness,), (rmse,) = clouds.icp.register(clouds.source, T_best[None], max_iterations=0)
-            unrepaired = replace(unrepaired, fitness=float(fitness), inlier_rmse=float(rmse) * frame.diameter)
-        promised = None if level.repaired_below is None or lost else WRONG
-        repaired = replace(unrepaired, wrong=promised)
+            repaired = replace(repaired, fitness=float(fitness), inlier_rmse=float(rmse) * frame.diameter)
         return repaired.decided(verdict, poses, list(proposals.T_n), level.threshold, level.good_below)
 
     def decided(
@@ -194,38 +189,34 @@ class Repair(ExplainedRegistration):
         """The exit code of the command: 0 if `T_target_source` is a pose to use."""
         return STATUSES[self.verdict]
 
-    def lines(self) -> list[str]:
-        """Lines of text."""
+    def lines(self, verbose: bool = False) -> list[str]:
+        """Lines of text; `verbose` also lists the poses where one is settled."""
         lines = [f"repair    {self.verdict}: {self.reason}"]
         if self.result is None:
             return lines
-        before = f"; before, {self.registered_result:.2f}" if self.verdict == REPAIRED else ""
-        limit = f"{in_decimals(self.tolerance)} {self.unit} ({100 * self.tolerance_share:.2g} % of the diameter)"
-        lines.append(f"result    probability {self.result:.2f} that the pose is off by more than {limit}{before}")
+        before = f"; as registered, {self.registered_result:.2f}" if self.verdict == REPAIRED else ""
+        lines.append(result_line(self.result, self.tolerance, self.tolerance_share, self.unit) + before)
         if self.verdict == REPAIRED:
-            promise = "none: the model was not calibrated on such repairs"
-            if self.wrong is not None:
-                promise = f"at most {self.wrong:.0%} of the poses that are called repaired are wrong"
-            lines.append(f"promise   {promise}")
+            kept = (
+                f"at most {self.wrong or 0:.0%} of repaired poses are wrong, on objects like those of its calibration"
+            )
+            lines.append(f"guarantee {NOT_CALIBRATED if self.wrong is None else kept}")
         if self.outliers is not None:
-            seen = f"{self.outliers:.0%} of the source are outliers"
-            if self.missing is not None:
-                side = side_in_words(self.missing.direction)
-                seen += f"; {self.missing.share:.0%} of the target were not seen, on {side}"
-            lines.append(f"seen      {seen}")
+            unseen = self.missing and f"{self.missing.share:.0%} of the target unseen"
+            side = self.missing and f", {side_in_words(self.missing.direction)}"
+            lines.append(f"observed  {self.outliers:.0%} outliers" + (f"; {unseen}{side}" if unseen else ""))
         if self.spread is not None:
-            rotation, shift = in_decimals(self.spread.rotation_deg), in_decimals(self.spread.translation)
-            lines.append(f"spread    {rotation}° and {shift} {self.unit}, root mean square")
+            lines.append(self.spread.line(self.unit, "given these points"))
             lines += self.free.lines(self.unit) if self.free else []
-        if self.status:
+        if self.status or verbose:
             lines += [pose.line(number, self.unit) for number, pose in enumerate(self.poses, 1)]
         return lines
 
-    def text(self) -> str:
+    def text(self, verbose: bool = False) -> str:
         """Return a report for a reader, of few lines."""
-        warnings = [f"warning   {line}" for line in self.warnings]
+        lines = [*(f"warning   {line}" for line in self.warnings), *self.lines(verbose), ""]
         head = f"T_target_source, in {self.unit}" + (", as registered" if self.status else "")
-        return "\n".join([*warnings, *self.lines(), "", head, *self.pose_rows(self.T_target_source), ""])
+        return "\n".join([*wrapped(lines), head, *self.pose_rows(self.T_target_source), ""])
 
     def html(self, names: Mapping[str, str] | None = None) -> str:
         """Return a page that needs no other file, with the registered pose and the repaired one side by side."""
@@ -254,4 +245,4 @@ def reason_of(verdict: Verdict, poses: Sequence[OtherPose], unit: str) -> str:
         return f"one of {len(poses)} poses is right, and the points do not tell which"
     if verdict.name == NOT_REPAIRED:
         return "the registered pose is called failed, and no other is called good"
-    return f"the source {poses[verdict.row - 1].words(unit, 'fits')}"
+    return poses[verdict.row - 1].words(unit)

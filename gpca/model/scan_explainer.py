@@ -288,7 +288,7 @@ def decision(state: str, reenacted: Reenacted, overlap: float, causes: Sequence[
     if causes and causes[0] == "overlap":
         return TREATMENTS["overlap"], "on their common parts alone, the scans would have been registered better"
     if not reenacted.poses[0].registered:
-        return RERUN, "another pose fits better; --save-pose writes it"
+        return RERUN, "pose 1 fits better"
     if overlap < LEAST_OVERLAP:
         return TREATMENTS["overlap"], f"only {overlap:.0%} of the source lies on the target"
     if state == NOT_SURE or not causes:

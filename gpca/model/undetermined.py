@@ -133,7 +133,7 @@ def axis_in_words(axis: Sequence[float]) -> str:
     along = int(np.argmax(np.abs(axis)))
     if abs(axis[along]) >= np.cos(np.deg2rad(ALONG_DEG)):
         return f"the target's {AXES[along]} axis"
-    return f"the axis ({', '.join(f'{part:.2f}' for part in axis)}) of the target's frame"
+    return f"the target's axis ({', '.join(f'{part:.2f}' for part in axis)})"
 
 
 def _upward(axis_3: np.ndarray) -> tuple[float, ...]:

@@ -86,13 +86,15 @@ def test_a_bad_start_is_said_beside_a_right_result_and_changes_no_state(diagnose
     numbers = {"result": 0.02, "threshold": 0.5, "tolerance": 6.0, "start": 0.9, "start_threshold": 0.6}
     fine = replace(said, **numbers, guarantee=None)
     assert (fine.state, fine.named) == ("nominal", ())
-    assert "result is right, but registrations from such starts often fail" in fine.remark
+    assert "result is right, but registrations from initial poses this far off often fail" in fine.remark
     assert replace(fine, start=0.5).remark == "nothing is wrong"
-    lines = "\n".join(fine.lines("mm"))
-    assert "that the pose is off by more than 6 mm (3 % of the diameter); only" not in lines
-    likely = "\n".join(replace(fine, result=0.6, threshold=0.8).lines("mm"))
-    assert "(3 % of the diameter); only from 0.80 on is it called failed" in likely
-    assert "start     registrations from such starts fail with probability 0.90" in lines
+    lines = fine.lines("mm", verbose=False)
+    assert "result    probability 0.02 of an error above 6 mm (3% of the diameter)" in lines
+    assert "start     registrations from initial poses this far off fail with probability 0.90" in lines
+    assert not [line for line in lines if line.startswith(("causes", "effects"))]
+    likely = replace(fine, result=0.6, threshold=0.8).lines("mm", verbose=True)
+    assert "result    probability 0.60 of an error above 6 mm (3% of the diameter); failed from 0.80 on" in likely
+    assert [line for line in likely if line.startswith("causes    ")]
     assert "failure" not in fine.as_dict()
 
 

@@ -57,16 +57,14 @@ def test_poses_are_named_by_where_they_lie_from_the_result(drill):
     assert [round(pose.turn_deg) for pose in found.poses] == [0, 90, 0, 52]
     assert found.poses[3].shift == pytest.approx(0.05)
     assert sum(pose.probability for pose in found.poses) == pytest.approx(1)
-    lines = outside(found, CanonicalFrame(np.zeros(3), 200.0), np.eye(4)).lines("mm")[2:]
-    assert lines[0].startswith("pose 1    the object fits as registered, within ")
-    assert lines[0].endswith(" mm: probability 0.40")
-    assert lines[1].startswith("pose 2    the object also fits turned by 90° about the target's z axis, ")
-    assert lines[2] == "pose 3    the object also fits moved by 20 mm: probability 0.20"
-    assert "turned by 52° about the axis (0.58, 0.58, 0.58) of the target's frame, 10 mm away" in lines[3]
+    lines = outside(found, CanonicalFrame(np.zeros(3), 200.0), np.eye(4)).lines("mm")[1:]
+    assert lines[0].startswith("pose 1    probability 0.40: the registered pose, within ")
+    assert lines[1].startswith("pose 2    probability 0.30: 90° about the target's z axis and ")
+    assert lines[2] == "pose 3    probability 0.20: 20 mm away from the registered pose"
+    assert lines[3].endswith("52° about the target's axis (0.58, 0.58, 0.58) and 10 mm away from the registered pose")
     # Where the likeliest pose is another, the text says so.
-    [line] = said(drill, moved((180, 0, 0))).lines("m")[2:]
-    assert line.startswith("pose 1    the object fits turned by 180° about the target's x axis, ")
-    assert line.endswith("probability 1.00")
+    [line] = said(drill, moved((180, 0, 0))).lines("m")[1:]
+    assert line.startswith("pose 1    probability 1.00: 180° about the target's x axis and ")
 
 
 def test_a_turn_that_leaves_a_symmetric_object_as_it_is_is_none(cylinder):
@@ -75,7 +73,7 @@ def test_a_turn_that_leaves_a_symmetric_object_as_it_is_is_none(cylinder):
     assert same.turn_deg == pytest.approx(0, abs=1e-3)
     assert not along.registered
     assert along.turn_deg == pytest.approx(0, abs=1e-3)
-    assert along.words("m", "fits") == "fits moved by 0.1 m"
+    assert along.words("m") == "0.1 m away from the registered pose"
     assert over.turn_deg == pytest.approx(40)
     upside_down = said(cylinder, moved((180, 0, 0))).poses[0]
     assert upside_down.registered
@@ -91,10 +89,10 @@ def test_effects_add_up_and_lengths_are_in_the_users_unit(drill):
     assert converted.error == pytest.approx(0.7)
     assert converted.noise == pytest.approx(0.2)
     assert converted.effects["pose"] == pytest.approx(10 * found.effects["pose"])
-    first, second = converted.lines("mm")[:2]
-    assert first == "effects   on the re-enacted error of 0.7 mm: noise 0.1, pose 0.2, overlap 0.4"
-    assert second == "observed  noise 0.2 mm, 25% outliers, 50% of the surface missing"
-    assert replace(converted, noise=0.04).lines("mm")[1].startswith("observed  noise below 0.04 mm, ")
+    effects = "effects   noise 0.1, pose 0.2, overlap 0.4 mm (Shapley shares of the re-enacted error, 0.7 mm)"
+    assert converted.effects_line("mm") == effects
+    assert converted.lines("mm")[0] == "observed  noise σ 0.2 mm per axis, 25% outliers; 50% of the target unseen"
+    assert replace(converted, noise=0.04).lines("mm")[0].startswith("observed  noise σ below 0.04 mm per axis, ")
 
 
 def test_a_pose_takes_the_users_source_to_the_users_target(drill):
@@ -122,4 +120,4 @@ def test_a_pose_takes_the_users_source_to_the_users_target(drill):
 
 def test_an_axis_has_a_name_where_it_is_nearly_one_of_the_targets():
     assert axis_in_words((0.1, -0.99, 0.05)) == "the target's y axis"
-    assert axis_in_words((0.6, 0.8, 0.0)) == "the axis (0.60, 0.80, 0.00) of the target's frame"
+    assert axis_in_words((0.6, 0.8, 0.0)) == "the target's axis (0.60, 0.80, 0.00)"

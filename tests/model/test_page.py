@@ -54,7 +54,7 @@ def test_a_notebook_shows_the_page_in_a_frame(explained):
 
 def test_a_page_says_what_the_text_says(html, explained):
     found = explained.diagnosis
-    for words in (explained.reason, *explained.diagnosis.causes, found.guarantee.call, "What to do", "What if?"):
+    for words in (explained.reason, *explained.diagnosis.causes, found.guarantee.alarm[0], "What to do", "What if?"):
         assert words in html
     for state in found.guarantee.states:
         assert f'<li class="in">{state.replace("several", "several causes")}</li>' in html
