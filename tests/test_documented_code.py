@@ -45,14 +45,16 @@ def test_the_python_of_the_page_of_guarantees_runs(registrations):
     assert set(names["called_M"]) <= set(OUTCOMES)
 
 
-def test_the_readme_shows_what_its_first_command_answers(monkeypatch, capsys):
+def test_the_docs_show_what_the_first_command_of_the_readme_answers(monkeypatch, capsys):
     monkeypatch.chdir(ROOT)
     monkeypatch.setenv("GPCA_MODEL", str(SHIPPED))
     text = (ROOT / "README.md").read_text()
     [command] = re.findall(r"^gpca (explain examples\S+ \S+)$", text, re.MULTILINE)
-    [answer] = re.findall(r"^```text\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     assert main(command.split()) == 0
-    assert set(answer.splitlines()) <= set(capsys.readouterr().out.splitlines())
+    said = set(capsys.readouterr().out.splitlines())
+    for page in (text, (ROOT / "docs/explain.md").read_text()):
+        [answer] = re.findall(r"^```text\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+        assert set(answer.splitlines()) <= said
 
 
 def test_the_tutorial_runs_to_its_end_and_warns_of_the_foreign_scale(model, tmp_path, monkeypatch, capsys):
