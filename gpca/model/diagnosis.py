@@ -134,8 +134,8 @@ class Guaranteed:
         if not self.labeled:
             shapes = f"{self.families} unseen families of shapes" if self.families else "unseen objects"
             return f"on {shapes}, for objects like these"
-        groups = f"of {self.families} groups, for a new group" if self.families else "for others like these"
-        return f"on {self.samples} labeled registrations {groups}"
+        groups = f" of {self.families} groups, for a new group" if self.families else ", for others like these"
+        return f"on {self.samples} labeled registrations{groups}"
 
 
 def state_probabilities(causes_N_3: np.ndarray, result_N: np.ndarray) -> np.ndarray:

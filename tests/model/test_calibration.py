@@ -92,7 +92,7 @@ def test_an_answer_says_whose_promise_it_is(explainer, pair):
     source, target = pair
     explanations = [explainer.explain(source[start:], target) for start in range(8)]
     for groups, words in (
-        (None, "by 8 labeled registrations for others like these"),
+        (None, "on 8 labeled registrations, for others like these"),
         (list("aabbccdd"), "of 4 groups"),
     ):
         mine = explainer.calibrated(explanations, ["right", "wrong"] * 4, groups)
