@@ -156,15 +156,13 @@ def best_motion(source_n_3: np.ndarray, target_n_3: np.ndarray, weights_n: np.nd
     return rigid_motion(R, q_3 - rotate(R, p_3))
 
 
-def plane_step(
-    source_n_3: np.ndarray, target_n_3: np.ndarray, normals_n_3: np.ndarray, weights_n: np.ndarray
-) -> np.ndarray:
+def plane_step(source_n_3: np.ndarray, target_n_3: np.ndarray, normals_n_3: np.ndarray, w_n: np.ndarray) -> np.ndarray:
     """Return one Gauss-Newton step (4×4) of Σ w (nᵀ(q - T p))² from the identity, least norm (Chen & Medioni 1992)."""
     from scipy.spatial.transform import Rotation
 
     jacobian_n_6 = np.concatenate([np.cross(source_n_3, normals_n_3), normals_n_3], axis=1)
     residuals_n = np.einsum("ni,ni->n", normals_n_3, target_n_3 - source_n_3)
-    weighted_n_6 = weights_n[:, None] * jacobian_n_6
+    weighted_n_6 = w_n[:, None] * jacobian_n_6
     hessian_6_6 = np.einsum("ni,nj->ij", weighted_n_6, jacobian_n_6)
     gradient_6 = np.einsum("ni,n->i", weighted_n_6, residuals_n)
     step_6 = np.linalg.lstsq(hessian_6_6, gradient_6, rcond=1e-10)[0]

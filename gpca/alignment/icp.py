@@ -1,7 +1,7 @@
 """Point cloud registration by ICP (Besl & McKay 1992; Chen & Medioni 1992; Segal et al. 2009) through Open3D."""
 
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -22,8 +22,7 @@ class ICPSettings:
     max_iterations: Count = 50
 
 
-@dataclass(frozen=True)
-class Registration:
+class Registration(NamedTuple):
     """The result of ICP: pose (4×4), share of source points with a correspondence, RMSE over those."""
 
     T_target_source: np.ndarray

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gpca.errors import InputError
+from gpca.errors import InputError, refusing
 from gpca.io.files import SPLITS, Axes, is_name, require_axes, require_file, require_memory, whole_file
 from gpca.numerals import LARGEST_NUMBER
 
@@ -52,14 +52,9 @@ def load_arrays(
     if axes is not None:
         of = {"source": TEXT} | ({} if axes[1] is None else {"seed": WHOLE})
         shapes, kinds = {**shapes, **dict.fromkeys(of, ())}, kinds | of
-    try:
-        with zipfile.ZipFile(path) as archive:
-            members = _checked_members(archive, path, shapes, kinds, remedy)
-            arrays = {name: _read(archive, info) for name, info in members.items()}
-    except InputError:
-        raise
-    except Exception as fault:  # numpy and zipfile raise errors of many kinds for a damaged archive
-        raise InputError(path, "is not a readable npz archive", remedy) from fault
+    with refusing(path, "is not a readable npz archive", remedy), zipfile.ZipFile(path) as archive:
+        members = _checked_members(archive, path, shapes, kinds, remedy)
+        arrays = {name: _read(archive, info) for name, info in members.items()}
     for name, array in arrays.items():
         value_fault = None
         if array.dtype.kind == "f" and not (np.abs(array) <= LARGEST_NUMBER).all():

@@ -132,11 +132,7 @@ class Container:
 
 
 def require_same_samples(
-    path: str | Path,
-    rows: Columns,
-    samples: Columns,
-    what: str = "registrations",
-    by: Sequence[str] = ("sample", "split"),
+    path: str | Path, rows: Columns, samples: Columns, what: str = "registrations", by: Sequence = ("sample", "split")
 ) -> None:
     """Raise an InputError unless the rows of a file are those of `samples`, by these columns and in their order."""
     for name in by:

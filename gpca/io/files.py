@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from unicodedata import category
 
-from gpca.errors import InputError
+from gpca.errors import InputError, refusing
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -237,11 +237,9 @@ def read_image(path: str | Path, remedy: str) -> np.ndarray:
     from PIL import Image
 
     Image.MAX_IMAGE_PIXELS = None  # of which it would warn
-    try:
-        with Image.open(path, formats=IMAGE_FORMATS) as image:
-            pixels = np.asarray(image) if image.width * image.height <= MOST_PIXELS else None
-    except Exception as fault:  # Pillow raises errors of many kinds for a damaged file
-        raise InputError(path, f"is truncated or not a readable image ({fault})", remedy) from fault
+    damaged = refusing(path, "is truncated or not a readable image ({})", remedy)
+    with damaged, Image.open(path, formats=IMAGE_FORMATS) as image:
+        pixels = np.asarray(image) if image.width * image.height <= MOST_PIXELS else None
     if pixels is None:
         raise InputError(path, f"has more than {MOST_PIXELS} pixels, too many for a frame", remedy)
     return pixels

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
-from gpca.errors import InputError
+from gpca.errors import InputError, refusing
 from gpca.io.files import require_file
 
 if TYPE_CHECKING:
@@ -139,10 +139,8 @@ def _size(node: yaml.Node, sizes: dict[int, int | None], path: Path) -> int:
 def read_json(path: Path, what: str, remedy: str) -> dict[str, Any]:
     """Return the object in a JSON file; InputError, "is not `what`", for a damaged one."""
     require_file(path, "no such file", remedy, LARGEST_JSON_BYTES)
-    try:
+    with refusing(path, f"is not {what} ({{}})", remedy):
         content = parse_json(path.read_text(encoding="utf-8"))
-    except ValueError as fault:  # also of UTF-8
-        raise InputError(path, f"is not {what} ({fault})", remedy) from fault
     if not isinstance(content, dict):
         raise InputError(path, f"is not {what} (its top level is not an object)", remedy)
     return content

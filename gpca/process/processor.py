@@ -2,9 +2,8 @@
 
 OpenBLAS, MKL, NumPy, torch, oneDNN and numba choose their code by the processor, each choice rounds differently, and
 ICP turns a last digit into another pose. So all are limited to x86-64-v3 (AVX2 and FMA), and MKL to the only code
-that it runs on any vendor's processor. Estimates such as ``rsqrtps``, which MKL uses at every level, differ by
-vendor; `gpca.portable` replaces those functions, and ``tests/vendor_guard.py`` fails where a step calls them. Pins
-have no effect on Open3D, small_gicp and other libraries compiled for one level, or on plugins.
+that it runs on any vendor's processor; :mod:`gpca.portable` replaces functions that still differ. Open3D, small_gicp
+and other libraries are compiled for one level.
 """
 
 import os

@@ -36,11 +36,6 @@ class Rehearsal:
     trials: Mapping[int, Sequence[Trial]]  # of each by its number
     bald: Mapping[int, float] = field(default_factory=dict)  # of each by its number, at its start, in nats
 
-    @property
-    def failures(self) -> list[Episode]:
-        """Those that failed."""
-        return [episode for episode in self.episodes if episode.failed]
-
 
 def policy_inputs(observed_F: np.ndarray, answer: Answer) -> np.ndarray:
     """All that a policy may weigh: the robot's observations; scores, variances and BALD of an explainer."""
@@ -90,7 +85,7 @@ def rehearsed_gate(episodes: Mapping[str, Sequence[Episode]], false_alarms: floa
 
 def robot_policy(recovery: Mapping, rehearsal: Rehearsal | None) -> RecoveryPolicy:
     """The declared thresholds; that of uncertainty by the rehearsed failures unless declared, infinite without any."""
-    bald_N = np.array([rehearsal.bald[episode.number] for episode in rehearsal.failures] if rehearsal else [np.inf])
+    bald_N = np.array([rehearsal.bald[e.number] for e in rehearsal.episodes if e.failed] if rehearsal else [np.inf])
     attempts = recovery["loop"]["budget"]
     return RecoveryPolicy.of_settings(recovery["thresholds"], recovery["treatments"], attempts, bald_N)
 

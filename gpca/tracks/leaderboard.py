@@ -128,13 +128,11 @@ def as_text(table: Table) -> str:
     printed = table.printed()
     rows = [printed["heads"], *([text for text, _ in row] for row in printed["rows"])]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    sides = [str.ljust if column < printed["label_columns"] else str.rjust for column in range(len(widths))]
     lines = []
     for row in rows:
-        aligned = [
-            cell.ljust(width) if column < printed["label_columns"] else cell.rjust(width)
-            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ]
-        lines.append("  ".join(aligned).rstrip())
+        cells = (align(cell, width) for align, cell, width in zip(sides, row, widths, strict=True))
+        lines.append("  ".join(cells).rstrip())
     lines.insert(1, "  ".join("-" * width for width in widths))
     return "\n".join([printed["caption"], "", *lines, "", *printed["footnotes"]])
 

@@ -26,15 +26,12 @@ def areas(published: Published, submitted: Mapping[str, Method]) -> dict[str, np
     """Return the AUGRC (1 + B,) of each method that names causes and has answered all counted samples of a track."""
     states, groups = counts(published), list(groups_of(published))
     pooled = [group for group in groups if group[0] == POOLED]
-    chosen = pooled or [group for group in groups if _is_enough(published, states, group[0])] or groups
+    fewest = {name: min(of[state] for state in published.track.required_states) for name, of in states.items()}
+    chosen = pooled or [group for group in groups if fewest[group[0]] >= FEWEST_FAILURES] or groups
     methods = {method.name: method for method in published.methods} | dict(submitted)
     by_group = [measured_of(published, methods, rows, draws) for _, rows, draws in chosen]
     names = [name for name in methods if all(AREA in measured.get(name, ({},))[0] for measured in by_group)]
     return {name: np.mean([measured[name][0][AREA] for measured in by_group], axis=0) for name in names}
-
-
-def _is_enough(published: Published, states: Mapping[str, Mapping[str, int]], group: str) -> bool:
-    return all(states[group][state] >= FEWEST_FAILURES for state in published.track.required_states)
 
 
 def ranks(mean_of: Mapping[str, np.ndarray]) -> dict[str, int]:

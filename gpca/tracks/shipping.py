@@ -129,5 +129,5 @@ def _method(key: Key, track: Track, config: Mapping[str, Any], parts: list[Frame
     calls = costs[name]["icp_calls"] if name in costs else NO_CALLS
     if track.name in (HARD_TRACK, SCANS_TRACK):  # their files have a column of calls
         calls = round(rows["icp_calls"].mean())
-    name, title = (track.with_training(text, training) for text in (name, entry.title))
-    return Method(name, title, entry.sight, int(calls), np.nan_to_num(scores_N_C), named_N)
+    other = "" if training in ("", *track.learn_from[:1]) else f" (from {training})"  # than the default data
+    return Method(name + other, entry.title + other, entry.sight, int(calls), np.nan_to_num(scores_N_C), named_N)

@@ -74,10 +74,6 @@ class Track:
         """Return the path of a file of samples below the folder of a run or a cache."""
         return self.samples.format(source=source, seed=seed)
 
-    def with_training(self, text: str, training: str) -> str:
-        """Return the name or title of a method with its training data, unless that is the default."""
-        return text if training in ("", *self.learn_from[:1]) else f"{text} (from {training})"
-
 
 _TRACKS = (
     Track(
