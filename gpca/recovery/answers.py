@@ -9,15 +9,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gpca.classifier.scores import Attribution
-from gpca.encoders.registry import EncoderSettings
 from gpca.encoders.training import embed, train_encoder
 from gpca.explainers.interface import ConceptExplainer, answer_of
 from gpca.explainers.registry import explainer_entry
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.synthesis import as_registrations
 from gpca.recovery.episodes import Episode
+from gpca.recovery.settings import RecoverySettings
 from gpca.uncertainty.designs import evaluate_design
-from gpca.uncertainty.settings import UncertaintySettings
 
 Explain = Callable[[Registrations], Attribution]
 
@@ -87,28 +86,21 @@ def as_shares(scores_N_C: np.ndarray) -> np.ndarray:
 
 
 def learn_explainers(
-    names: Iterable[str],
-    registrations: Registrations,
-    encoder: EncoderSettings,
-    settings: Mapping[str, Mapping],
-    uncertainty: UncertaintySettings,
-    most_remedied: int,
-    source: str,
-    seed: int,
+    names: Iterable[str], registrations: Registrations, settings: RecoverySettings, source: str, seed: int
 ) -> dict[str, Explain]:
     """Train the encoder and fit every explainer on the split ``train``; return what attributes registrations."""
     train = registrations.subset(registrations.rows("train"))
 
     @cache
     def model() -> Any:
-        return train_encoder(registrations, source, seed, encoder)[0]
+        return train_encoder(registrations, source, seed, settings.encoder)[0]
 
     def embedded(given: Registrations) -> Registrations:
-        h_S_d, logits_S_C = embed(model(), given, source, seed, encoder)
+        h_S_d, logits_S_C = embed(model(), given, source, seed, settings.encoder)
         return replace(given, attached={"embedding": h_S_d, "head_logits": logits_S_C})
 
     def remedied(given: Registrations) -> Registrations:
-        outcomes, *seconds = evaluate_design("removal", given, source, seed, uncertainty)
+        outcomes, *seconds = evaluate_design("removal", given, source, seed, settings.uncertainty)
         return outcomes.attach_to(given, *seconds)
 
     def timed(explainer: ConceptExplainer, attach: Callable, given: Registrations) -> Attribution:
@@ -117,12 +109,13 @@ def learn_explainers(
         # All get the same, as the encoder sees many at once; the explainer's own seconds hold what remedies took too.
         return replace(attribution, seconds_N=np.full(len(given), (perf_counter() - started) / len(given)))
 
+    few = train.subset(np.arange(len(train))[: settings.section["remedied"]])
     explain: dict[str, Explain] = {}
     for name in names:
         entry = explainer_entry(name)
-        explainer = entry.made(source, seed, **(settings.get(name) or {}))
+        explainer = entry.made(source, seed, **(settings.explainers.get(name) or {}))
         reads_embeddings = entry.reads == "embeddings"
         attach = embedded if reads_embeddings else remedied
-        explainer.fit(attach(train if reads_embeddings else train.subset(np.arange(len(train))[:most_remedied])))
+        explainer.fit(attach(train if reads_embeddings else few))
         explain[name] = partial(timed, explainer, attach)
     return explain

@@ -58,15 +58,8 @@ def run(job: Job) -> None:
     with record_provenance(outputs, data_files(objects), job.settings, seed=job.seed):
         tables = lay_tables(surfaces(objects, job.downloads), settings, *axes)
         registered = register_situations(tables, recovery["train"], recovery["calibration"], loop)
-        explain = learn_explainers(
-            [name for name in dict.fromkeys(entry.explainer for entry in entries) if name],
-            as_samples(registered),
-            settings.encoder,
-            settings.explainers,
-            settings.uncertainty,
-            recovery["remedied"],
-            *axes,
-        )
+        names = [name for name in dict.fromkeys(entry.explainer for entry in entries) if name]
+        explain = learn_explainers(names, as_samples(registered), settings, *axes)
         learning = any(e.learns or e.queues or e.rehearsed or e.gated or e.alarmed for e in entries)
         rehearsals = replace(loop, failures=recovery["rehearsals"])
         rehearsed = find_episodes(tables["rehearsals"], rehearsals) if learning else []

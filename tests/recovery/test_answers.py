@@ -1,3 +1,5 @@
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -15,13 +17,13 @@ def test_signed_scores_become_shares():
 
 
 ENCODER = EncoderSettings(draw_points=32, draws=1, epochs=1, batch_size=12, options={"k": 4, "point_features": 16})
-SETTINGS = {"gpca": {"iterations": 5, "inducing": 4, "draws": 20}}
+EXPLAINERS = {"gpca": {"iterations": 5, "inducing": 4, "draws": 20}}
 
 
 def test_an_answer_needs_no_label_and_takes_time_and_remedies_cost_registrations(registrations):
-    names = ("gpca", "sa_supervised")
-    uncertainty = UncertaintySettings(starts=13, icp_points=32)
-    learned = learn_explainers(names, registrations, ENCODER, SETTINGS, uncertainty, 9, "tiny", 0)
+    uncertainty, section = UncertaintySettings(starts=13, icp_points=32), {"remedied": 9}
+    settings = SimpleNamespace(encoder=ENCODER, explainers=EXPLAINERS, uncertainty=uncertainty, section=section)
+    learned = learn_explainers(("gpca", "sa_supervised"), registrations, settings, "tiny", 0)
     some = registrations.subset(registrations.rows("test")[:3]).without_labels()
     answers = {name: explain(some) for name, explain in learned.items()}
     assert list(answers) == ["gpca", "sa_supervised"]
