@@ -79,15 +79,12 @@ def run_folder(tmp_path):
     return folder
 
 
-def test_work_counts_once_per_block_and_stages_keep_their_order(run_folder):
+def test_work_counts_once_per_block_and_shares_and_overhead_add_up_to_the_core_time(run_folder):
     stages = pipeline.read_stages(run_folder)
     assert list(stages) == ["objects", "encoders", "collect", "tables"]
     assert stages["encoders"].work_s == [4.0, 4.0]
     assert stages["tables"].work_s == [1.0]
     assert stages["objects"].peaks_mb == [150.0]
-
-
-def test_shares_and_overhead_add_up_to_the_core_time(run_folder):
     result = pipeline.summary(pipeline.read_stages(run_folder), core_s=2 * 10.0)
     assert result["stages"]["encoders"] == {"jobs": 1, "work_s": 8.0, "job_s": 10.0, "peak_mb": 620.5, "share": 0.4}
     assert result["overhead_share"] == pytest.approx(1 - 12 / 20)

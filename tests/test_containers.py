@@ -16,7 +16,7 @@ def packages(recipe):
     return set(words.split())
 
 
-def test_both_install_what_the_check_of_every_commit_takes_for_granted():
+def test_both_install_what_the_check_needs_and_make_the_results_unless_told_otherwise():
     check = (ROOT / ".ci/run").read_text()
     libraries = {"libgl1", "libx11-6", "libgomp1"}
     assert all(f"missing+=({library})" in check for library in libraries)
@@ -25,9 +25,6 @@ def test_both_install_what_the_check_of_every_commit_takes_for_granted():
     assert packages(DOCKER) == packages(APPTAINER) == libraries | {"gcc", "libc6-dev", "python3-venv", *given.split()}
     for recipe in (DOCKER, APPTAINER):
         assert f"debian:{workflow['container'].removeprefix('debian:')}-slim" in recipe
-
-
-def test_both_make_the_environment_and_run_the_results_unless_told_otherwise():
     assert re.search(r"^RUN make environment\n\nCMD \[\"make\", \"results\"\]\n\Z", DOCKER, re.MULTILINE)
     assert re.search(r"^    make environment\n\n%runscript\n", APPTAINER, re.MULTILINE)
     assert "set -- make results" in APPTAINER

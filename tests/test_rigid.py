@@ -101,7 +101,7 @@ def test_a_flat_cloud_gives_a_rotation_and_no_mirror(flat):
     assert np.linalg.det(T[:3, :3]) == pytest.approx(1)
 
 
-def test_steps_to_planes_reach_a_known_motion():
+def test_steps_to_planes_reach_a_known_motion_but_for_what_one_plane_leaves_open():
     normals = RANDOM.normal(size=(30, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     motion = rigid.exp(np.array([[0.1, -0.2, 0.1, 0.3, 0.1, -0.2]]))[0]
@@ -111,9 +111,6 @@ def test_steps_to_planes_reach_a_known_motion():
     for _ in range(20):
         T = rigid.plane_step(rigid.transform(T, SOURCE), target, normals, WEIGHTS) @ T
     np.testing.assert_allclose(T, motion, atol=1e-9)
-
-
-def test_what_one_plane_leaves_open_does_not_move():
     points = SOURCE * [1, 1, 0]
     T = rigid.plane_step(points, points + np.array([0.7, -0.4, 0.1]), np.tile([0.0, 0.0, 1.0], (30, 1)), np.ones(30))
     np.testing.assert_allclose(T[:3, 3], [0, 0, 0.1], atol=1e-9)
@@ -151,15 +148,12 @@ def test_beyond_half_a_turn_log_takes_the_shorter_way_to_the_same_motion(angle):
     assert np.allclose(rigid.exp(xi_n_6), T_n, atol=1e-6)
 
 
-def test_the_adjoint_takes_a_twist_to_another_frame():
+def test_the_adjoint_takes_a_twist_to_another_frame_and_jacobians_move_points():
     T = rigid.exp(np.array([[0.4, -1.0, 0.7, 0.3, 0.1, -0.2]]))[0]
     for xi_6 in twists(0.8, 5):
         assert np.allclose(
             rigid.exp((rigid.adjoint(T) @ xi_6)[None])[0], T @ rigid.exp(xi_6[None])[0] @ np.linalg.inv(T), atol=1e-12
         )
-
-
-def test_points_move_by_their_jacobians():
     points = np.random.default_rng(0).normal(size=(7, 3))
     for axis in np.eye(6):
         moved = points @ rigid.exp(1e-6 * axis[None])[0][:3, :3].T + rigid.exp(1e-6 * axis[None])[0][:3, 3]

@@ -113,10 +113,14 @@ def test_unreadable_files_are_refused_in_one_line(tmp_path, content, expected):
     assert "\n" not in str(caught.value)
 
 
-def test_a_file_may_have_further_columns_where_its_reader_knows_them(tmp_path):
+def test_further_columns_other_orders_and_quotes_are_read_too(tmp_path):
     (tmp_path / "a.csv").write_text("sample,score_pose,own\n1,2,3\n")
     assert list(read_csv(tmp_path / "a.csv", ["sample"], ["score_*", "own"])) == ["sample", "score_pose", "own"]
     assert len(read_csv(tmp_path / "a.csv", ["sample"], ANY)) == 1
+    path = tmp_path / "seconds.csv"
+    path.write_text('seconds,split\n0.5,"test"\n')
+    rows = read_columns(path, ("split", "seconds"), ("seconds",))
+    assert (list(rows["split"]), list(rows["seconds"])) == (["test"], [0.5])
 
 
 def test_columns_are_written_and_read_as_by_pandas(tmp_path):
@@ -161,10 +165,3 @@ def test_faulty_columns_are_refused_as_by_pandas(tmp_path, content, expected):
         path.write_text(content)
     with pytest.raises(InputError, match=expected):
         read_columns(path, ("split", "seconds"), ("seconds",))
-
-
-def test_columns_in_another_order_or_in_quotes_are_read_too(tmp_path):
-    path = tmp_path / "seconds.csv"
-    path.write_text('seconds,split\n0.5,"test"\n')
-    rows = read_columns(path, ("split", "seconds"), ("seconds",))
-    assert (list(rows["split"]), list(rows["seconds"])) == (["test"], [0.5])

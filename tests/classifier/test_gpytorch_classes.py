@@ -72,16 +72,13 @@ def test_on_the_way_it_is_what_fewer_iterations_make_it():
     assert done == 9
 
 
-def test_as_many_questions_as_classes_are_answered_one_by_one_and_torchs_generator_stays_where_it_was():
+def test_as_many_questions_as_classes_are_answered_one_by_one_and_as_many_samples_are_refused():
     before = torch.random.get_rng_state()
     ours, theirs = pair(iterations=5)
     assert torch.equal(torch.random.get_rng_state(), before)
     for n in (1, 3, 7):
         for own, other in zip(ours.posterior(H_TEST[:n]), theirs.posterior(H_TEST[:n]), strict=True):
             assert np.abs(own - other).max() < LATENT
-
-
-def test_as_many_samples_as_classes_are_refused():
     with pytest.raises(InputError, match=r"3 samples for 3 classes, .* transposed; give more samples"):
         pair(h=H[:3], labels=LABELS[:3])
 

@@ -42,13 +42,10 @@ def test_draws_that_disagree_have_bald_of_log_c_whatever_is_added_to_all():
         assert np.allclose(one, other, atol=1e-9)
 
 
-def test_entropy_is_in_nats_of_the_normalized_scores_and_takes_zeros():
+def test_entropy_is_in_nats_and_the_largest_score_names_the_concept():
     assert entropy(np.array([[1.0, 0, 0], [0.5, 0.5, 0], [1 / 3] * 3])) == pytest.approx([0, np.log(2), np.log(3)])
     made = attribution(2, scores_N_C=np.array([[2.0, 2.0, 0.0], [5.0, 0.0, 0.0]]))
     assert made.entropy_N == pytest.approx([np.log(2), 0])
-
-
-def test_the_largest_score_names_the_concept_and_ties_go_to_the_first():
     scores = np.array([[0.2, 0.3, 0.5], [0.4, 0.4, 0.2], [0.2, 0.4, 0.4], [1 / 3, 1 / 3, 1 / 3], [0.1, 0.8, 0.1]])
     made = attribution(5, scores_N_C=scores, abstained_N=np.array([False] * 4 + [True]))
     assert made.predicted_N.tolist() == ["overlap", "noise", "pose", "noise", ""]

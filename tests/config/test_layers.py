@@ -63,16 +63,13 @@ def test_what_is_false_is_left_out_as_if_it_were_not_there(key):
     assert config == given  # for a Snakemake that is given this config once more
 
 
-def test_an_action_takes_its_own_policy_along():
+def test_actions_and_uncertainties_take_their_policies_along():
     config = merged(load(), {"recovery": {"actions": {"new_view": False}, "treatments": {"overlap": "denoise"}}})
     recovery = without_false(config)["recovery"]
     assert list(recovery["actions"]) == ["reinitialize", "denoise"]
     assert "always_denoise" in recovery["policies"]
     assert "always_new_view" not in recovery["policies"]
     assert not any("new_view" in policy for policy in recovery["policies"])
-
-
-def test_a_policy_goes_with_the_uncertainty_that_its_explainer_reads():
     whole = without_false(changed("uncertainty.removal", False))
     assert "shap_removal" not in whole["recovery"]["policies"]
     assert not {"shap_removal", "shap_removal_residual", "sa_local_removal"} & set(whole["explainers"])

@@ -21,7 +21,7 @@ def tidy(rows):
     return pd.DataFrame(rows, columns=list(TIDY_COLUMNS))
 
 
-def test_confusions_are_pooled_over_sources_and_seeds_in_the_order_of_the_concepts():
+def test_confusions_are_pooled_in_the_order_of_the_concepts_and_shown_as_shares():
     metrics = tidy([*records("ycb", "shap", COUNTS, 0), *records("cup", "shap", COUNTS, 1)])
     accuracies = tidy([("attribution", "ycb", "shap", "accuracy", "all", 0, 0.5)])
     pooled = pooled_confusions(pd.concat([accuracies, metrics]))
@@ -29,9 +29,6 @@ def test_confusions_are_pooled_over_sources_and_seeds_in_the_order_of_the_concep
     assert list(pooled["shap"].index) == list(CONCEPTS)
     assert list(pooled["shap"].columns) == [*CONCEPTS, "abstained"]
     np.testing.assert_array_equal(pooled["shap"], 2 * COUNTS)
-
-
-def test_a_matrix_shows_the_share_of_each_true_concept():
     figure = draw_confusions(tidy(records("ycb", "explainer_0", COUNTS)), EXPLAINERS, (), "YCB")
     [panel] = figure.axes
     shown = ["80 %", "10 %", "0 %", "30 %", "50 %", "20 %", "0 %", "0 %", "100 %"]

@@ -29,7 +29,7 @@ def intervals():
     return pd.DataFrame(rows, columns=[*KEYS, *AGAINST, *NUMBERS])
 
 
-def test_each_explainer_is_a_line_over_the_steps_that_were_run_and_ends_with_its_number():
+def test_each_explainer_is_a_line_over_the_steps_that_were_run_and_the_bytes_repeat(same_bytes):
     [panel] = loophole(RUN, intervals()).axes
     lines = {container.get_label(): container for container in panel.containers}
     assert set(lines) == set(EXPLAINERS.values())
@@ -37,9 +37,6 @@ def test_each_explainer_is_a_line_over_the_steps_that_were_run_and_ends_with_its
     assert lines[EXPLAINERS["rule"]].lines[0].get_ydata() == pytest.approx([95, 90, 40])
     assert {text.get_text() for text in panel.texts} == {"50", "40"}
     assert [np.round(x) for x in lines[EXPLAINERS["gpca"]].lines[0].get_xdata()] == [0, 2, 3]  # no unseen objects
-
-
-def test_the_figure_is_the_same_bytes_each_time_and_none_of_the_numbers_of_others(same_bytes):
     same_bytes(lambda: loophole(RUN, intervals()))
     with pytest.raises(InputError, match="have no"):
         loophole(RUN, intervals().query("method == 'registration'"))

@@ -54,16 +54,13 @@ def test_table4_has_the_papers_rows_and_a_column_per_source():
     assert "| Matérn 3/2 | 0.01 | 200 | **81.0 (76.0 to 83.0)** | **91.0 (86.0 to 93.0)** |" in table.markdown()
 
 
-def test_rows_and_sources_that_were_not_fitted_are_left_out():
+def test_what_was_not_fitted_is_left_out_stand_ins_are_said_and_nothing_to_show_is_a_fault():
     part = intervals(("ycb",))
     table = kernel_grid.table4_kernels(REAL, part[~part["method"].str.endswith("-200")])
     assert list(table.columns) == ["ycb"]
     assert len(table.rows) == 1
     text = kernel_grid.table4_kernels(REAL, intervals(seeds=1)).markdown()
     assert "85.0 (80.0 to 87.0)" in text and "Over 1 seed, 200 test samples each" in text
-
-
-def test_stand_ins_are_said_and_nothing_to_show_is_a_fault():
     table = kernel_grid.table4_kernels(run(stand_in=True), intervals())
     assert "on procedural stand-ins" in table.caption
     with pytest.raises(InputError, match="has nothing to show"):

@@ -136,16 +136,13 @@ def found(files_of_families, tmp_path_factory):
     return read_clustered(path).set_index(["table", "metric"])
 
 
-def test_values_are_those_of_the_diagnostics(files_of_families, found):
+def test_values_are_those_of_the_diagnostics_within_their_intervals_and_limits(files_of_families, found):
     metrics = collect(None, *files_of_families)[0]
     mean = metrics.groupby(["table", "metric"])["value"].mean()
     for key in found.index:
         assert found.loc[key, "value"] == pytest.approx(mean[key])
     assert ("learners/in_distribution+severity", RHO) in found.index
     assert ("learners/severity", "aurc_max_score") in found.index
-
-
-def test_intervals_hold_their_value_and_stay_within_its_limits(found):
     rows = found[(found["value"] > 0) & (found["value"] < 1)]
     assert (rows["low"] <= rows["value"]).all() and (rows["value"] <= rows["high"]).all()
     assert (rows["low"] < rows["high"]).all()
@@ -201,16 +198,13 @@ def test_table5_shows_accuracy_and_diagnostics_and_marks_the_best(numbers):
     assert f"Over 3 seeds; {OVER_FAMILIES}" in markdown
 
 
-def test_table5_shift_has_every_kind_of_shift(numbers):
+def test_tables5_have_every_kind_of_shift_and_name_the_samples_of_each(numbers):
     table = table5_shift(REAL, numbers)
     assert [key for key in table.columns if key.startswith("rho")] == ["rho_severity", "rho_source", "rho_objects"]
     titles = [column.title for column in table.columns.values()]
     assert len(set(titles)) == len(titles)
     assert table.cells[0, "rho_objects"].test_samples == 3 * (40 + 40)
     assert table.cells[0, "accuracy_objects"].test_samples == 3 * 40
-
-
-def test_the_footnote_names_the_samples_of_every_set_that_there_is(numbers):
     assert samples_of_seed(numbers, "ycb", "objects") == 40
     note = table5_learners(REAL, numbers[numbers["table"] != "learners/severity"]).footnotes[0]
     assert "40 in distribution, 40 source, 40 seen objects, 40 objects" in note and "severity" not in note

@@ -49,7 +49,7 @@ def asked(stage_files):
     return first_round(Staged.load(*stage_files), "overlap", ActiveLearningSettings.from_dict(LEARNING), "solids", 0)
 
 
-def test_the_round_is_the_first_of_the_run_and_its_pool_the_trainings(asked, stage_files):
+def test_the_round_is_the_first_of_the_run_and_asks_about_uncertain_and_different_samples(asked, stage_files):
     stages, settings = Staged.load(*stage_files), ActiveLearningSettings.from_dict(LEARNING)
     of = stages.registrations
     assert sorted([*asked.rows_N, *asked.labeled]) == of.rows("train").tolist()
@@ -59,9 +59,6 @@ def test_the_round_is_the_first_of_the_run_and_its_pool_the_trainings(asked, sta
     steps = rounds(task.project(gpc), gpc, "bald_kmeans", settings, "solids", 0, "pretrained")
     next(steps)
     assert next(steps)[1] == asked.chosen.tolist()
-
-
-def test_the_round_asks_about_the_most_uncertain_and_about_different_ones(asked):
     assert set(asked.candidates) == set(np.argsort(-asked.bald_N, kind="stable")[: BATCH * EXPANSION])
     assert len(set(asked.chosen)) == BATCH and set(asked.chosen) <= set(asked.candidates)
 

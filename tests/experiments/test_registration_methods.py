@@ -211,7 +211,7 @@ def seconds():
     return tidy(rows, "seconds")
 
 
-def test_starts_stand_apart_and_global_methods_have_none(intervals, seconds):
+def test_starts_causes_and_severities_stand_apart_and_global_methods_have_no_start(intervals, seconds):
     table = table11_registration(RUN, intervals, seconds, seconds)
     assert [tuple(key for key, _ in labels) for labels in table.rows] == [
         ("initial", "gicp"), ("initial", "huber"), ("none", "fgr"), ("fgr", "gicp"), ("fgr", "huber")
@@ -228,10 +228,6 @@ def test_starts_stand_apart_and_global_methods_have_none(intervals, seconds):
     text = table.markdown()
     assert "Over 3 seeds, 40 test samples each; in brackets: the 95 % interval of a bootstrap over families" in text
     assert "| Initial pose | GICP | 50.0 (40.0 to 55.0) |" in text
-
-
-def test_causes_and_severities_have_columns(intervals, seconds):
-    table = table11_registration(RUN, intervals, seconds, seconds)
     assert "noise_middle" not in table.columns
     assert (0, "noise_low") in table.cells and (0, "noise_middle") not in table.cells
 

@@ -23,7 +23,7 @@ RUNTIME = pd.concat([rows(), rows("GPU", "A GPU", ("features", "explanation"), 0
 RUN = Run({"sources": {"tiny": {"title": "Tiny", "stand_in": False}}, "model": {"source": "tiny"}})
 
 
-def test_every_component_stands_beside_the_printed_value():
+def test_every_component_stands_beside_the_printed_value_and_a_run_without_any_is_named():
     table = table7_runtime(RUN, RUNTIME)
     text = table.markdown()
     assert "| ICP alignment | CPU | CPU | 1.00 | 0.50 | 2.00 | 3000 |" in text
@@ -39,8 +39,5 @@ def test_every_component_stands_beside_the_printed_value():
     assert records["icp", "CPU", "mean"][4] == pytest.approx(1.0)
     assert records["icp", "CPU", "mean"][8] == 100
     assert records["retraining", "CPU", "published"][4:] == (10000.0, "", "", 1, 100, True)
-
-
-def test_what_was_not_measured_is_named():
     with pytest.raises(InputError, match="has no rows"):
         table7_runtime(RUN, RUNTIME[:0])

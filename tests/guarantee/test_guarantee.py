@@ -22,7 +22,7 @@ def drawn(random, samples):
     return scores / scores.sum(axis=1, keepdims=True), state_N.astype(str), family_N
 
 
-def test_states_are_labels_but_for_several_causes():
+def test_states_and_their_scores_are_those_of_labels_but_for_several_causes():
     worth = {"nominal": [0, 0.001, 0.002, 0.003], "noise": [0, 0.1, 0.002, 0.1], "several": [0, 0.1, 0.1, 0.2]}
     # subsets of noise and pose; overlap adds nothing
     error = np.array([[*of, *of] for of in worth.values()])
@@ -31,9 +31,6 @@ def test_states_are_labels_but_for_several_causes():
     assert labels_of(truth)[2] != SEVERAL
     between = Truth(np.full((1, 8), 0.025), np.zeros((1, 8)), 0.02, 0.03, 0.01, 1.0)
     assert states_of(between).tolist() == [BORDERLINE]
-
-
-def test_scores_of_states_by_hand():
     scores = state_scores(np.array([[0.2, 0.8, 0, 0], [0.0, 0.5, 0.5, 0], [1.2, 0, 0, 0], [0.4, 0.9, 0.9, -1.0]]))
     assert scores[:2] == pytest.approx(np.array([[0.2, 0.8, 0, 0, 0], [0, 0.25, 0.25, 0, 0.5]]))
     assert scores[2, 0] == 1 and scores[3] == pytest.approx([0.4, 0.15, 0.15, 0, 0.3])

@@ -168,7 +168,7 @@ def test_inconsistent_file_is_refused(tmp_path):
         ObjectClouds.load(tmp_path / "other.npz")
 
 
-def test_a_share_of_the_clusters_at_least_one_and_never_all_is_unseen():
+def test_a_share_of_whole_clusters_at_least_one_and_never_all_is_unseen():
     clusters = np.array([f"part{i}" for i in range(10)])
     assert drawn(clusters, 0.2, "mine", 0).sum() == 2
     assert drawn(clusters[:3], 0.2, "mine", 0).sum() == 1
@@ -176,9 +176,6 @@ def test_a_share_of_the_clusters_at_least_one_and_never_all_is_unseen():
     assert not drawn(clusters[:1], 0.5, "mine", 0).any()
     assert np.array_equal(drawn(clusters, 0.2, "mine", 0), drawn(clusters[::-1], 0.2, "mine", 0)[::-1])
     assert len({tuple(drawn(clusters, 0.2, "mine", seed)) for seed in range(5)}) > 1
-
-
-def test_all_rows_of_a_cluster_are_drawn_together():
     clusters = np.array(["cup", "box", "cup", "can", "box"])
     for seed in range(5):
         is_unseen = drawn(clusters, 0.4, "mine", seed)

@@ -215,16 +215,13 @@ def mugs(tmp_path):
     return tmp_path
 
 
-def test_views_are_spread_evenly_over_sequences_and_frames(mugs):
+def test_views_are_spread_evenly_over_frames_and_instances_in_several_folders_told_apart(mugs):
     found = list(from_entry({}, mugs))
     assert [surface.name for surface in found] == [
         f"coffee_mug_1_{sequence}_{frame}" for sequence in (1, 2, 4) for frame in (1, 11)
     ]
     assert found[1].vertices_m[:, 2].tolist() == [11, 11, 11]
     assert found[0].faces is None
-
-
-def test_instances_in_several_folders_are_told_apart(mugs):
     for name in ("apple_1_1_1", "apple_1_1_2", "apple_2_1_1", "loose"):
         (mugs / f"{name}.pcd").write_bytes(view(500))
     found = list(from_entry({"views_per_instance": 1, "unit": "mm"}, mugs))

@@ -33,7 +33,7 @@ def shown(measured):
     return cause_samples(measured, MEASURED, SETTINGS)
 
 
-def test_the_first_failure_of_each_cause_is_shown(shown, causes):
+def test_the_first_failure_of_each_cause_is_shown_with_the_shares_and_errors_of_the_truth(shown, causes):
     rows = first_of_each_cause(causes)
     assert 0 < len(rows) <= len(CONCEPTS)
     assert set(causes.registrations.split[rows]) == {"test"}
@@ -42,9 +42,6 @@ def test_the_first_failure_of_each_cause_is_shown(shown, causes):
     assert [sample["concept"] for sample in shown] == causes.truth.dominant[rows].tolist()
     assert len({sample["concept"] for sample in shown}) == len(shown)
     assert first_of_each_cause(causes.subset(causes.rows("train"))) == []
-
-
-def test_shares_and_errors_are_those_of_the_truth(shown, causes):
     for sample, row in zip(shown, first_of_each_cause(causes), strict=True):
         assert [share["percent"] for share in sample["shares"]] == pytest.approx(100 * causes.truth.phi[row], abs=0.01)
         errors = 100 * causes.truth.error[row, list(BY_SIZE)]

@@ -64,13 +64,10 @@ def test_a_point_is_told_where_it_is_and_how_far_the_other_cloud(sparse_pair):
         assert (side[:, 6] >= 0).all() and (side[:, 6] <= 1 + 1e-6).all()
 
 
-def test_a_cloud_that_lies_on_its_model_is_told_so(sparse_pair):
+def test_a_cloud_on_its_model_is_told_so_and_nothing_but_the_place_depends_on_the_size(sparse_pair):
     side = told(replace(sparse_pair, observed=sparse_pair.model))[0]
     assert side[:, 3] == pytest.approx(np.full(96, np.log(0.02)), abs=1e-4)  # no farther than what counts as nothing
     assert side[:, 5:] == pytest.approx(np.tile([0.0, 1.0], (96, 1)), abs=1e-4)  # thickness and normals agree
-
-
-def test_what_is_told_besides_the_place_does_not_depend_on_the_objects_size(sparse_pair):
     twice = replace(sparse_pair, observed=2 * sparse_pair.observed, model=2 * sparse_pair.model)
     assert told(twice)[..., 3:] == pytest.approx(told(sparse_pair)[..., 3:], abs=1e-3)
 
@@ -107,23 +104,17 @@ def described(registrations, **changes):
     return distances.describe_registrations(replace(registrations, **changes), "tiny", 100, points=128)
 
 
-def test_every_group_has_its_width_and_is_finite(few):
+def test_groups_are_finite_and_relations_tell_the_motion_and_nothing_of_the_objects_size(few):
     groups = described(few)
     shapes = {name: (12, width) for name, width in distances.WIDTHS.items()} | {"points": (12, 2, 128, 7)}
     assert {name: array.shape for name, array in groups.items()} == shapes
     assert all(np.isfinite(array).all() for array in groups.values())
-
-
-def test_relations_do_not_depend_on_the_objects_size(few):
-    """All lengths of a pair twice as large: its distances are twice as large, its relations as before."""
+    # All lengths of a pair twice as large: its distances are twice as large, its relations as before.
     scaled = {name: 2 * getattr(few, name) for name in ("points", "target_points", "inlier_rmse")}
     twice, once = described(few, **scaled), described(few)
     assert twice["distances"] == pytest.approx(2 * once["distances"], rel=1e-4)
     assert twice["relations"][:, :30] == pytest.approx(once["relations"][:, :30], rel=1e-3, abs=1e-3)
     assert twice["densities"] == pytest.approx(once["densities"], abs=1e-4)
-
-
-def test_the_motion_is_that_from_the_initial_pose(few):
     moved = described(few)["relations"][:, 30:33]
     still = described(few, T_target_source_icp=few.T_target_source_init)["relations"][:, 30:33]
     assert (moved[few.concept == "pose", 0] > 0.05).all()  # radians

@@ -19,16 +19,13 @@ def test_every_set_is_trained_on_one_that_is_trained_on_itself():
     assert all(TRAINED_ON[home] == home for home in TRAINED_ON.values())
 
 
-def test_rows_become_registrations_without_clouds():
+def test_rows_become_registrations_without_clouds_and_parts_are_joined_in_order():
     rows = sets().rows("severity", "test")
     registrations = sets().registrations(rows)
     assert len(registrations) == len(rows) == 12
     assert np.array_equal(registrations.embedding, sets().h[rows])
     assert len(registrations.cloud(3)) == 0
     assert set(registrations.subset(np.array([2, 5])).without_labels().concept) == {""}
-
-
-def test_parts_are_joined_in_order():
     joined = ShiftedSets.joined([sets(), sets(3)])
     assert len(joined.set) == 6 * 12 + 6 * 3
     assert np.array_equal(joined.h[72:], sets(3).h)

@@ -72,8 +72,8 @@ def test_most_failures_are_found_and_few_good_ones_acted_on():
     assert 0.01 < alarms_N[~failed_N].mean() < 0.09
 
 
-def test_the_threshold_is_set_on_good_ones_of_tables_that_were_not_learned():
-    """Each table has a place of its own: a classifier that has learned it would know its registrations."""
+def test_the_threshold_is_set_on_good_ones_of_other_tables_by_the_rank_of_conformal_prediction():
+    # Each table has a place of its own: a classifier that has learned it would know its registrations.
     random = np.random.default_rng(1)
     table_N = np.repeat(np.arange(10), 4)
     failed_N = np.tile([True, False, False, False], 10)
@@ -81,9 +81,6 @@ def test_the_threshold_is_set_on_good_ones_of_tables_that_were_not_learned():
     gate = learn_gate(observed_N_F, failed_N, table_N, 0.2)
     by_heart = np.sort(gate.failure(observed_N_F[~failed_N]))
     assert gate.threshold > by_heart[-6]
-
-
-def test_the_threshold_has_the_rank_of_conformal_prediction():
     values = np.arange(1, 20) / 20
     assert alarm_threshold(values, 0.05) == values[-1]  # the 19th of 19
     assert alarm_threshold(values, 0.1) == values[-2]

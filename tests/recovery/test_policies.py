@@ -26,14 +26,11 @@ def made(name, **means):
     return partial(policy_entry(name, ACTIONS).decide, means=Means(POLICY, ACTIONS, **means))
 
 
-def test_gpca_follows_the_scores_and_queues_what_is_uncertain_while_the_acting_one_never_does():
+def test_gpca_follows_the_scores_and_what_an_action_changed_and_queues_what_is_uncertain():
     sure, unsure = case(scores=[[0.1, 0.2, 0.7]], bald=[0.1]), case(scores=[[0.1, 0.2, 0.7]], bald=[0.3])
     assert made("gpca")(sure).action == made("gpca_acting")(sure).action == "new_view"
     assert made("gpca")(unsure).action == QUEUE
     assert made("gpca_acting")(unsure).action == "new_view"
-
-
-def test_after_an_action_the_fall_of_its_concept_counts_and_scores_need_no_uncertainty():
     for first, action in (([0.1, 0.2, 0.7], "reinitialize"), ([0.1, 0.0, 0.9], "new_view")):  # stuck, fallen
         taken = case(actions=("new_view",), scores=[first, [0.1, 0.25, 0.65]], bald=[0.1, 0.1])
         assert made("gpca")(taken).action == action

@@ -21,7 +21,7 @@ def test_errors_are_add_where_nothing_is_symmetric(drill, model):
     assert model.errors(poses) == pytest.approx(PoseErrors(model.points, 256, symmetric=False)(poses))
 
 
-def test_a_can_that_is_turned_about_its_axis_is_where_it_was_however_few_its_points(can):
+def test_a_can_turned_about_its_axis_is_where_it_was_and_poses_are_as_far_apart_as_their_surfaces(can, drill):
     surface = ModelSurface(can[:200])
     turned = exp(np.array([[0, 0, 1.0, 0, 0, 0], [1.0, 0, 0, 0, 0, 0]]))
     assert surface.symmetric
@@ -29,30 +29,21 @@ def test_a_can_that_is_turned_about_its_axis_is_where_it_was_however_few_its_poi
     found = surface.errors(turned)
     assert found[0] < 0.3 * nearest[0]
     assert found[1] > 0.05
-
-
-def test_poses_are_apart_as_far_as_their_surfaces_are(can, drill):
     turned = exp(np.array([[0, 0, 1.0, 0, 0, 0]]))
     assert ModelSurface(can[:400]).apart(turned)[0] < 0.012
     assert ModelSurface(drill[:400]).apart(turned)[0] > 0.05
 
 
-def test_distances_are_those_from_planes_as_far_as_the_spacing_reaches(drill, model):
+def test_distances_are_those_from_planes_within_reach_and_count_as_errors_beyond(drill, model):
     points = drill[400:500] + np.random.default_rng(1).normal(scale=0.03, size=(100, 3))
     rows = np.linalg.norm(model.points[:, None] - points, axis=2).argmin(axis=0)
     offsets = points - model.points[rows]
     square, off = (offsets**2).sum(axis=1), (offsets * model.normals[rows]).sum(axis=1)
     along = np.maximum(np.sqrt(np.maximum(square - off**2, 0)) - CORNER * model.spacing_M[rows], 0)
     assert model.distances(points) == pytest.approx(np.minimum(np.hypot(off, along), np.sqrt(square)), abs=1e-9)
-
-
-def test_the_plane_of_a_point_beyond_reach_is_still_that_of_the_nearest(model):
     far = np.array([[5.0, 0, 0], [0.1, 0, 0]])
     nearest = np.linalg.norm(model.points[:, None] - far, axis=2).argmin(axis=0)
     assert np.array_equal(model.residuals(far)[1], nearest)
-
-
-def test_what_is_beyond_reach_counts_as_far_as_errors_do(model):
     assert model.distances(np.array([[5.0, 0, 0]]))[0] == 0.5
 
 

@@ -67,22 +67,16 @@ def rows(registrations, judges):
     return exchange(estimators=("monte_carlo", "censi", "cello", "bonnabel")).run(registrations, judges)
 
 
-def test_every_explainer_has_a_row_for_each_estimator_and_test_sample(rows):
+def test_every_sample_has_a_row_no_concept_without_an_estimate_and_no_pose_without_a_start(rows):
     assert (rows["exchanged"] == "estimator").all() and (rows["learnt_from"] == rows["asked_of"]).all()
     counts = rows.groupby(["asked_of", "explainer"])["sample"].agg(list)
     assert len(counts) == 4 * 3
     assert all(samples == [0, 1, 2] for samples in counts)
-
-
-def test_without_an_estimate_no_concept_is_named_and_the_reason_is_given(rows):
     refused = rows[rows["asked_of"] == "bonnabel"]
     assert refused["abstained"].all() and (refused["concept_predicted"] == "").all()
     assert refused["failure"].str.startswith("the Hessian is no covariance of point-to-point").all()
     assert (rows.loc[rows["asked_of"] == "monte_carlo", "failure"] == "").all()
-
-
-def test_an_estimator_that_reads_no_start_gives_pose_no_value(rows):
-    """Censi's form is the same however far the starts spread."""
+    # Censi's form is the same however far the starts spread.
     censi = rows[(rows["asked_of"] == "censi") & (rows["explainer"] == "shap_additive") & (rows["failure"] == "")]
     assert len(censi) and censi["score_pose"].abs().max() < 1e-9
     assert (censi["score_noise"] != 0).all()

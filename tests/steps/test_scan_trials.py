@@ -41,7 +41,7 @@ def rows(monkeypatch):
     return try_methods(pairs, "tiny", 0, {name: {} for name in methods}, SETTINGS)
 
 
-def test_local_methods_start_on_the_ladder_and_at_the_pose_of_a_global_one(rows):
+def test_local_methods_start_on_the_ladder_and_at_global_poses_and_failures_have_a_reason(rows):
     still = rows["still"]
     assert still["start"].tolist() == ["initial", "oracle"] * 3
     rungs = rungs_of(3, LADDER, "tiny", 0)
@@ -54,9 +54,6 @@ def test_local_methods_start_on_the_ladder_and_at_the_pose_of_a_global_one(rows)
     # At the pose of the global method they are right, whatever the unit that they were given.
     assert still[still["start"] == "oracle"]["rmse_m"].tolist() == pytest.approx([0, 0, 0], abs=1e-9)
     assert rows["oracle"]["start"].tolist() == ["none"] * 3 and (rows["oracle"]["seconds"] >= 0).all()
-
-
-def test_a_method_without_a_pose_has_its_reason(rows):
     assert set(rows["blind"]["failure"]) == {"no match"} and (rows["blind"]["fitness"] == 0).all()
 
 

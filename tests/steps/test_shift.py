@@ -81,13 +81,10 @@ def test_no_view_of_an_object_that_is_held_out_is_trained_on(objects, embedded):
     assert not seen & unseen
 
 
-def test_knn_is_the_mean_over_the_nearest_in_standardized_features():
+def test_distances_are_means_over_the_nearest_and_those_of_the_covariance():
     train, query = np.array([[0.0], [1.0], [2.0], [3.0]]), np.array([[1.0], [13.0]])
     deviation = np.std(train)
     assert shift.distances(train, query, 2)[:, 0] == pytest.approx([0.5 / deviation, 10.5 / deviation])
-
-
-def test_mahalanobis_of_many_samples_is_that_of_their_covariance():
     mixing = np.array([[2.0, 0.0], [1.5, 0.5]])
     train, query = RANDOM.normal(size=(20000, 2)) @ mixing.T, RANDOM.normal(size=(5, 2)) * 3
     precision = np.linalg.inv(mixing @ mixing.T)

@@ -38,7 +38,7 @@ def test_readers_get_pooled_rows_the_best_first_and_the_trivial_ones_last(tmp_pa
         assert len(list(csv.reader(file))) == 1 + 12 * len(KEYS)
 
 
-def test_of_many_rows_those_of_each_dataset_the_rule_and_the_papers_stay():
+def test_of_many_rows_those_of_datasets_the_rule_the_paper_and_plugins_stay(tmp_path, monkeypatch):
     methods = ["oracle", "gpca", *(f"net{k}" for k in range(20)), "rule"]
     part = short(large(methods, ("cups", "cans", "cars")))
     assert len(part.rows) <= MOST_ROWS
@@ -47,11 +47,7 @@ def test_of_many_rows_those_of_each_dataset_the_rule_and_the_papers_stay():
         shown = [labels[1][0] for labels in part.rows if labels[0][0] == source]
         assert shown == ["net19", "net18", "net17", "gpca", "rule"]
     assert len(short(large(methods, ("pooled",))).rows) == MOST_ROWS
-
-
-def test_the_row_of_a_plugin_stays_however_it_ranks(tmp_path, monkeypatch):
     (tmp_path / "my_plugin_of_tables.py").write_text("EXPLAINERS = {'net0': None}\n")
-    methods = ["oracle", "gpca", *(f"net{k}" for k in range(20)), "rule"]
     assert "net0" not in {key for labels in short(large(methods, ("pooled",))).rows for key, _ in labels}
     monkeypatch.setattr("gpca.process.plugins.named", lambda: [str(tmp_path / "my_plugin_of_tables.py")])
     monkeypatch.syspath_prepend(str(tmp_path))
