@@ -66,7 +66,7 @@ def isolated(installed, code, folder, *flags):
     return done.stdout
 
 
-def test_the_wheel_holds_every_module_and_every_data_file_and_nothing_else(wheel):
+def test_the_wheel_holds_every_file_and_says_its_version_license_and_command(wheel):
     with zipfile.ZipFile(wheel) as archive:
         names = {name for name in archive.namelist() if ".dist-info/" not in name}
     assert names - {LIBRARY} == files_of(ROOT) - {LIBRARY}
@@ -74,9 +74,6 @@ def test_the_wheel_holds_every_module_and_every_data_file_and_nothing_else(wheel
     assert LIBRARY in names or not COMPILER or not may_pin()
     assert ("gpca/model/shipped.pt" in names) == SHIPPED.is_file()
     assert {"gpca/py.typed", "baselines/py.typed"} <= names
-
-
-def test_the_wheel_says_its_version_license_and_command(wheel):
     with zipfile.ZipFile(wheel) as archive:
         [metadata] = [name for name in archive.namelist() if name.endswith(".dist-info/METADATA")]
         entry_points = archive.read(metadata.replace("METADATA", "entry_points.txt")).decode()

@@ -57,11 +57,12 @@ def pinned():
     return {canonicalize_name(name): version for name, version in (line.split("==") for line in lock())}
 
 
-def test_the_lock_pins_every_package_and_no_build():
+def test_the_lock_pins_every_package_no_build_and_nothing_that_nothing_needs():
     assert all(line.count("==") == 1 and "+" not in line and "@" not in line for line in lock())
     assert not [line for line in lock() if line.lower().startswith(("nvidia", "cuda", "triton"))]
     for requirement in requirements(*EXTRAS):
         assert requirement.specifier.contains(pinned()[canonicalize_name(requirement.name)]), requirement
+    assert set(pinned()) == needed_by(requirements(*EXTRAS))
 
 
 def test_wheels_have_the_loops_of_the_locked_numba():
@@ -105,10 +106,6 @@ def needed_by(requirements):
     return {name for name, *_ in needed}
 
 
-def test_the_lock_holds_nothing_that_nothing_needs():
-    assert set(pinned()) == needed_by(requirements(*EXTRAS))
-
-
 def files_of(*folders):
     return [path for folder in folders for path in (ROOT / folder).rglob("*.py")]
 
@@ -142,9 +139,11 @@ def test_what_is_imported_is_named_where_it_is_needed(files, lists):
     assert imported(files) <= {canonicalize_name(requirement.name) for requirement in requirements(*lists)}
 
 
-def test_what_is_named_is_imported_or_run():
+def test_what_is_named_is_imported_or_run_and_what_is_optional_an_extra_of_its_own():
     named = {canonicalize_name(requirement.name) for requirement in requirements(*EXTRAS)}
     assert named == imported(files_of(*RUNS, *CHECKS)) | RUN | OPTIONAL
+    own = requirements("methods")[len(requirements()) :]
+    assert {canonicalize_name(requirement.name) for requirement in own} == OPTIONAL
 
 
 def test_what_an_extra_installs_is_named_by_it_where_it_is_missing():
@@ -153,11 +152,6 @@ def test_what_an_extra_installs_is_named_by_it_where_it_is_missing():
         own = {canonicalize_name(Requirement(line).name) for line in PROJECT["optional-dependencies"][extra]}
         own -= {PROJECT["name"], "open3d", *map(canonicalize_name, RUN - {"snakemake"})}
         assert {canonicalize_name(CALLED.get(module, module)) for module in modules} == own
-
-
-def test_what_is_optional_is_an_extra_of_its_own():
-    own = requirements("methods")[len(requirements()) :]
-    assert {canonicalize_name(requirement.name) for requirement in own} == OPTIONAL
 
 
 def test_the_conda_environment_of_the_rules_holds_the_lock():

@@ -26,7 +26,7 @@ def candidates(subjects):
     ]
 
 
-def test_counts_and_severities_are_within_their_ranges_and_what_is_not_applied_is_small_but_there(candidates):
+def test_counts_and_severities_are_within_their_ranges_and_small_of_what_is_not_applied(candidates, subjects):
     for candidate in candidates:
         severity = candidate.severity
         for count in (len(candidate.model), len(candidate.kept)):
@@ -44,6 +44,11 @@ def test_counts_and_severities_are_within_their_ranges_and_what_is_not_applied_i
         assert np.array_equal(candidate.start((0, 2)), candidate.T_near)
         assert np.array_equal(candidate.start((1,)), candidate.T_init)
     assert len({len(candidate.model) - len(candidate.kept) for candidate in candidates}) > 30  # drawn apart
+    for k in range(20):
+        applied = np.array([False, True, False])
+        severity = draw_candidate(subjects[0].surface, applied, SETTINGS, np.random.default_rng(k)).severity
+        assert severity["rotation_rad"] >= np.deg2rad(10)
+        assert (severity["noise"] <= 0.003, severity["crop"] <= 0.05, severity["outliers"]) == (True, True, 0)
 
 
 def test_the_number_of_observed_points_tells_nothing_of_what_is_missing(subjects):
@@ -116,14 +121,6 @@ def test_a_partial_model_is_whole_without_overlap_and_changes_no_draw_of_others(
     assert unhidden.whole_model is None
 
 
-def test_severities_of_what_is_not_applied_are_small(subjects):
-    for k in range(20):
-        applied = np.array([False, True, False])
-        severity = draw_candidate(subjects[0].surface, applied, SETTINGS, np.random.default_rng(k)).severity
-        assert severity["rotation_rad"] >= np.deg2rad(10)
-        assert (severity["noise"] <= 0.003, severity["crop"] <= 0.05, severity["outliers"]) == (True, True, 0)
-
-
 def test_every_subset_of_the_causes_is_drawn():
     random = np.random.default_rng(0)
     drawn = np.array([draw_applied(CauseSettings(present=0.25), random) for _ in range(2000)])
@@ -189,14 +186,11 @@ def test_missing_surface_hurts_the_model_on_its_way_and_hardly_what_was_observed
     assert errors["observed"] < 0.5 * errors["model"]
 
 
-def test_an_absent_cause_cannot_be_removed(drill):
+def test_an_absent_cause_cannot_be_removed_and_the_uncertainty_is_the_divergence_from_none(drill):
     measured = counterfactuals(candidate_of(drill, True, False, False), drill)
     assert {measured.error(subset) for subset in (0, 2, 4, 6)} == {measured.error(0)}
     assert {measured.error(subset) for subset in (1, 3, 5, 7)} == {measured.error(7)}
     assert measured.error(0) != measured.error(7)
-
-
-def test_a_pair_without_causes_ends_at_the_truth_and_the_uncertainty_is_the_divergence_from_it(drill):
     clean = counterfactuals(candidate_of(drill, False, False, False), drill)
     assert clean.error(7) < 0.02 and clean.uncertainty(7) == 0
     measured = counterfactuals(candidate_of(drill, True, True, True), drill)

@@ -48,15 +48,12 @@ def test_patches_are_connected_and_as_large_as_a_half_space_would_be(subjects):
     assert np.sort(counts)[-PATCHES:].sum() > 0.95 * len(hidden)
 
 
-def test_from_one_side_the_near_half_of_a_sphere_is_visible():
+def test_from_one_side_the_near_half_of_a_sphere_is_visible_and_a_severity_is_what_it_hides(subjects):
     points = np.random.default_rng(0).normal(size=(2000, 3))
     points /= 2 * np.linalg.norm(points, axis=1, keepdims=True)
     visible = np.zeros(2000, bool)
     visible[visible_rows(points, np.array([0.0, 0.0, 1.0]))] = True
     assert visible[points[:, 2] < -0.15].mean() > 0.95 and visible[points[:, 2] > 0].mean() < 0.05
-
-
-def test_a_severity_is_what_one_side_hides(subjects):
     candidate = drawn(subjects, occlusion="visibility")
     assert candidate.severity["crop"] == 1 - len(candidate.kept) / len(candidate.clean)
     assert drawn(subjects, (True, True, False), occlusion="visibility").severity["crop"] <= 0.05

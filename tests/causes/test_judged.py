@@ -103,25 +103,19 @@ def test_the_registration_that_is_shown_is_judged_by_its_own_state(judged):
     assert one(always)["state_accuracy"] == one(always)["state_accuracy_shown"] == 0.5
 
 
-def test_false_alarms_are_counted_where_nine_of_ten_failures_are_found(judged):
+def test_false_alarms_and_the_calibration_of_nominal_are_those_of_their_definitions(judged):
     known = judged.label != BORDERLINE
     failed, alarm = (judged.label != NOMINAL)[known], judged.alarm[known]
     threshold = max(t for t in alarm if (alarm[failed] >= t).mean() >= RECALL)
     assert one(judged)["false_alarm_rate"] == pytest.approx((alarm[~failed] >= threshold).mean())
-
-
-def test_the_score_of_nominal_is_calibrated_where_it_comes_true_as_often_as_it_says(judged):
     nominal = judged.label == NOMINAL
     assert one(replace(judged, nominal=nominal.astype(float)))["nominal_calibration"] == 0
     assert one(replace(judged, nominal=1.0 - nominal))["nominal_calibration"] == 1
 
 
-def test_a_gate_names_no_cause_and_has_the_measures_of_an_alarm_alone(judged):
+def test_a_gate_has_the_measures_of_an_alarm_alone_and_samples_between_the_limits_none(judged):
     gate = replace(judged, named=np.full(len(judged), ""))
     assert set(one(gate)) == {*OF_ALARM, *OF_SHOWN, "state_accuracy"}
-
-
-def test_samples_between_the_limits_count_nowhere(judged):
     known = judged.label != BORDERLINE
     changed = np.where(known, judged.alarm, 99.0)
     found, expected = one(replace(judged, alarm=changed)), one(judged)

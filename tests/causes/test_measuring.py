@@ -27,14 +27,11 @@ def test_neither_an_object_nor_views_of_one_instance_are_in_both_splits_and_seed
         assert len(split["test"]) == 5
 
 
-def test_the_seeds_take_turns_with_the_folds_that_a_file_names(subjects):
+def test_the_seeds_take_turns_with_the_folds_of_a_file_and_one_family_cannot_be_split(subjects):
     placed = [replace(subject, fold=fold) for subject, fold in zip(subjects, (0, 1, 0, 2), strict=True)]
     tested = [names(split_by_object(placed, "four", seed, SETTINGS)["test"]) for seed in range(6)]
     of_fold = [names([subject for subject in placed if subject.fold == fold]) for fold in range(3)]
     assert tested == of_fold * 2
-
-
-def test_one_object_cannot_be_split(subjects):
     views = [replace(subjects[0], name=f"mug_1_1_{view}", family="mug") for view in range(5)]
     for too_few in (subjects[:1], views):
         message = "causes of one: has objects of one family alone, .*; give objects of at least two families of shapes"

@@ -126,16 +126,13 @@ def test_labels_of_the_missing_class_make_it_recognized(kernel):
     assert accuracy(gpc, H_TEST, LABELS_TEST) > 0.95
 
 
-def test_an_update_takes_embeddings_or_what_the_kernel_says_of_them():
+def test_an_update_takes_embeddings_or_projections_and_lowers_bald_where_its_labels_are():
     by_embeddings = fitted_without_overlap()
     by_projection = copy(by_embeddings)
     by_embeddings.update(H[NEW[:4]], LABELS[NEW[:4]])
     by_projection.update(by_projection.project(H[NEW[:4]]), LABELS[NEW[:4]])
     for one, other in zip(by_embeddings.attribute(H_TEST), by_projection.attribute(H_TEST), strict=True):
         assert np.array_equal(one, other)
-
-
-def test_further_labels_lower_bald_where_they_are():
     gpc = fitted_without_overlap()
     before = gpc.attribute(H[NEW])[2]
     gpc.update(H[NEW], LABELS[NEW])

@@ -205,7 +205,7 @@ def given(**values):
     return with_types(merged(load(), values), values)
 
 
-def test_values_of_the_command_line_have_the_types_of_a_config_file():
+def test_values_of_the_command_line_have_the_types_of_a_config_file_or_are_refused_in_one_line():
     config = given(
         seeds=["0", "3"],
         registrations={"train": "36", "severities": {"noise": ["0.01", "0.02"]}},
@@ -220,9 +220,6 @@ def test_values_of_the_command_line_have_the_types_of_a_config_file():
     assert config["data_dir"] is None
     assert config["run"] == "mine"
     assert list(check(config)) == ["coffee_cup", "ycb"]
-
-
-def test_a_number_in_place_of_a_list_is_one_line_that_says_how():
     with pytest.raises(InputError) as caught:
         check(given(seeds=0))
     assert str(caught.value) == "config key seeds: 0 should be a valid array; give a list: [0]"

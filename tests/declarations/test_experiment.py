@@ -23,13 +23,10 @@ def test_no_two_experiments_write_one_file_or_read_one_section():
     assert len(set(sections)) == len(sections)
 
 
-def test_a_tidy_file_is_collected_from_the_files_of_all_names():
+def test_a_tidy_file_is_collected_from_all_names_and_an_experiment_run_where_there_are_some():
     tidy = Tidy("mine.csv", "m:f", {"files": "mine/{source}/seed{seed}.csv"})
     assert tidy.inputs({"source": ["x", "y"], "seed": [0]}) == {"files": ["mine/x/seed0.csv", "mine/y/seed0.csv"]}
     assert (tidy.target, Tidy("mine.csv", rule="mine_metrics").target) == ("mine", "mine_metrics")
-
-
-def test_an_experiment_is_run_where_its_names_are_not_empty():
     experiment = Experiment(name="mine", needs=("seed", "source"))
     assert experiment.is_run({"seed": [0], "source": ["x"]})
     assert not experiment.is_run({"seed": [0], "source": []})

@@ -170,7 +170,7 @@ def test_the_order_of_points_does_not_matter_and_the_motion_is_handed_on(pair_en
         assert torch.allclose(pair_encoder((points[:, :, torch.randperm(16)], motion)), found, atol=1e-5)
 
 
-def test_both_clouds_count_and_which_is_which(pair_encoder, pairs):
+def test_both_clouds_count_which_is_which_too_and_every_weight_learns(pair_encoder, pairs):
     points, motion = pairs
     with torch.no_grad():
         found = pair_encoder(pairs)[:, :-MOTION]
@@ -179,9 +179,6 @@ def test_both_clouds_count_and_which_is_which(pair_encoder, pairs):
         moved[:, 1] += 1  # the model alone
         assert not torch.allclose(swapped, found, atol=1e-3)
         assert not torch.allclose(pair_encoder((moved, motion))[:, :-MOTION], found, atol=1e-3)
-
-
-def test_every_weight_of_an_encoder_learns(pair_encoder, pairs):
     pair_encoder.train()(pairs).square().sum().backward()
     assert all(weight.grad is not None and weight.grad.abs().sum() > 0 for weight in pair_encoder.parameters())
 

@@ -91,16 +91,13 @@ def test_accuracies_and_differences_have_their_interval_over_scenes_and_the_devi
     )
 
 
-def test_untrained_explainers_stand_below_and_a_backbone_without_a_title_has_its_name():
+def test_untrained_explainers_and_published_encoders_stand_below_and_are_never_the_best():
     values = VALUES | {"chance": (0.3, 0.3, 0.4), "gpca_pair": (0.9, 0.9, 0.9)}
     table = make(values, explainers={"chance": {}, "gpca_pair": {}})
     assert [row[0][0] for row in table.rows][-2:] == ["analytical_gpc", "chance"]
     assert table.best() == make().best()
     values = {"mine-none": (0.8, 0.8, 0.8), "pointnet-none": (0.6, 0.7, 0.65)}
     assert "| To mine (points) |" in make(values, backbones=["mine", "pointnet"], reductions=["none"]).markdown()
-
-
-def test_encoders_as_published_stand_below_the_judged_ones_and_are_never_the_best():
     values = VALUES | {"dgcnn_1024-none": (0.9, 0.9, 0.9), "dgcnn_1024-pca": (0.9, 0.9, 0.8)}
     published = {"published": {"dgcnn": "dgcnn_1024"}}
     table = make(values, **published)

@@ -161,14 +161,11 @@ def test_the_branch_follows_from_what_gpca_knows_and_not_from_the_true_error(sta
     assert decide(replace(stages, u_clean=np.inf), row, policy).action == NOTHING
 
 
-def test_the_threshold_of_bald_is_drawn_and_named(stage_files):
+def test_the_threshold_of_bald_is_named_and_no_letter_is_smaller_than_7_pt_or_outside(stage_files):
     figure = overview(stage_files, thresholds=THRESHOLDS | {"uncertain": 0.25})
     assert "BALD: ask above 0.25 nats" in words_of(figure)
     lines = [line.get_xdata()[0] for panel in figure.axes for line in panel.get_lines()]
     assert {0.25, 0.4} <= set(lines)
-
-
-def test_no_letter_is_smaller_than_7_pt_and_none_leaves_the_figure(stage_files):
     figure = overview(stage_files)
     assert len(words_of(figure)) > 15
     assert_words_are_large_enough_and_inside(figure)

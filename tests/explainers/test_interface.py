@@ -75,7 +75,7 @@ def test_a_file_dropped_into_baselines_is_found_and_an_unknown_explainer_refused
         explainer_entry("shapley")
 
 
-def test_gpca_names_the_concept(embedded):
+def test_gpca_names_the_concept_and_does_not_look_at_what_it_is_to_explain(embedded):
     explainer = explainer_entry("gpca").make("tiny", 0, **QUICK)
     explainer.fit(embedded.subset(embedded.rows("train")))
     test = embedded.subset(embedded.rows("test"))
@@ -85,11 +85,6 @@ def test_gpca_names_the_concept(embedded):
     assert not attribution.abstained_N.any()
     assert attribution.icp_calls_N.tolist() == [0] * len(test)
     assert (attribution.seconds_N > 0).all()
-
-
-def test_gpca_does_not_look_at_what_it_is_to_explain(embedded):
-    explainer = GPCA("tiny", 0, **QUICK)
-    explainer.fit(embedded.subset(embedded.rows("train")))
     shuffled = dataclasses.replace(embedded, concept=np.roll(embedded.concept, 1))
     expected = explainer.explain(embedded)
     for other in (shuffled, embedded.without_labels()):

@@ -11,7 +11,7 @@ from gpca.io.arrays import save_arrays
 from gpca.objects.surface import Surface
 
 
-def test_no_scene_is_in_training_and_test(tiny):
+def test_no_scene_is_in_training_and_test_and_one_number_in_two_datasets_is_two_scenes(tiny):
     instances, _ = tiny
     for seed in range(5):
         rows = instances.split("tiny", seed, test_share=0.4)
@@ -20,10 +20,6 @@ def test_no_scene_is_in_training_and_test(tiny):
         assert len(rows["train"]) and len(rows["test"])
     splits = {tuple(instances.split("tiny", seed, 0.4)["test"]) for seed in range(5)}
     assert len(splits) > 1
-
-
-def test_scenes_of_one_number_in_two_datasets_are_two(tiny):
-    instances, _ = tiny
     dataset = np.where(np.arange(len(instances)) % 2 == 0, "one", "other")
     rows = changed_columns(instances, {"scene": np.zeros(len(instances), int), "dataset": dataset}).split("t", 0, 0.4)
     assert {tuple(np.unique(dataset[rows[split]])) for split in ("train", "test")} == {("one",), ("other",)}

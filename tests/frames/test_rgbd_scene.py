@@ -40,29 +40,23 @@ def test_objects_rest_on_the_table_and_do_not_touch():
         assert 0.01 - 1e-9 <= min(distances) < 0.02  # apart, but cluttered
 
 
-def test_the_true_poses_put_every_measured_point_on_its_model(tiny):
+def test_true_poses_put_measured_points_on_their_models_and_visible_masks_are_disjoint(tiny, scenes):
     instances, objects = tiny
     assert len(instances) >= 20
     for i, index in enumerate(instances.object_index):
         tree, T_camera_object = cKDTree(objects.points(index)), instances.T_camera_object_true[i]
         assert median_distance(tree, T_camera_object, instances.cloud_m(i)) < 0.003  # the spacing of the models' points
-
-
-def test_visible_masks_are_disjoint(scenes):
     for scene in sorted((scenes / "test").iterdir()):
         for image, objects in json.loads((scene / "scene_gt.json").read_text()).items():
             names = [f"{int(image):06d}_{n:06d}.png" for n in range(len(objects))]
             assert np.sum([read_image(scene / "mask_visib" / name, "") > 0 for name in names], axis=0).max() == 1
 
 
-def test_a_scene_is_the_same_whatever_others_there_are_and_however_often_it_is_drawn(scenes, tmp_path):
+def test_a_scene_is_the_same_whatever_others_there_are_and_noise_changes_its_depth_alone(scenes, tmp_path):
     write_scenes(surfaces(), "tiny", scene_settings(count=1), tmp_path / "fewer")
     expected, drawn = files(scenes), files(tmp_path / "fewer")
     assert all(drawn[name] == expected[name] for name in drawn)
     assert "test/000000/depth/000001.png" in drawn
-
-
-def test_noise_changes_depth_and_nothing_else(scenes, tmp_path):
     write_scenes(surfaces(), "tiny", scene_settings(noise=DepthNoise(), count=1), tmp_path / "noisy")
     expected, noisy = files(scenes / "test/000000"), files(tmp_path / "noisy/test/000000")
     assert {name.split("/")[0] for name in noisy if noisy[name] != expected[name]} == {"depth"}

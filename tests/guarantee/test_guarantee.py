@@ -49,12 +49,16 @@ def test_the_plain_form_is_read_back_as_it_was(choice):
     assert guarantee.samples == 390 and guarantee.families == 12
 
 
-def test_borderline_samples_are_left_out_and_the_order_does_not_matter():
+def test_borderline_samples_are_left_out_in_any_order_and_arrays_of_other_lengths_refused():
     scores, state, family = drawn(np.random.default_rng(8), 400)
     kept = state != BORDERLINE
     order = np.random.default_rng(9).permutation(400)
     expected = calibrate(scores[kept], state[kept], family[kept])
     assert calibrate(scores, state, family) == expected == calibrate(scores[order], state[order], family[order])
+    scores, state, family = drawn(np.random.default_rng(11), 100)
+    for arrays in ((scores[:50], state, family), (scores, state, family[:50])):
+        with pytest.raises(InputError, match="have other numbers of scores, states and families; give one each"):
+            calibrate(*arrays)
 
 
 @pytest.mark.parametrize(
@@ -76,10 +80,3 @@ def test_a_damaged_plain_form_is_one_line(spoil, message):
     spoil(plain)
     with pytest.raises(InputError, match=message):
         Guarantee.from_dict(plain)
-
-
-def test_arrays_of_other_lengths_are_refused():
-    scores, state, family = drawn(np.random.default_rng(11), 100)
-    for arrays in ((scores[:50], state, family), (scores, state, family[:50])):
-        with pytest.raises(InputError, match="have other numbers of scores, states and families; give one each"):
-            calibrate(*arrays)

@@ -125,13 +125,10 @@ def run_script(folder, body):
     return done.returncode, (folder / "log.txt").read_text()
 
 
-def test_a_fault_in_a_script_is_one_line_in_the_log_and_status_2(tmp_path):
+def test_a_script_ends_with_one_line_of_its_fault_or_the_provenance_of_data_and_parameters(tmp_path):
     status, log = run_script(tmp_path, 'raise InputError("metrics.csv", "is empty", "regenerate it")')
     assert (status, log) == (2, "working\nmetrics.csv: is empty; regenerate it\n")
     assert not list(tmp_path.glob("*.provenance.json"))
-
-
-def test_the_provenance_of_a_scripts_outputs_names_data_and_parameters_but_not_code(tmp_path):
     assert run_script(tmp_path, 'open("table.md", "w").write("a table")') == (0, "working\n")
     record = json.loads((tmp_path / "table.md.provenance.json").read_text())
     assert list(record["inputs_sha256"]) == ["predictions.csv"]

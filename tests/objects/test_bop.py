@@ -139,7 +139,7 @@ def test_an_angle_is_counted_from_the_nearest_turn_that_changes_nothing():
     assert bop.angle_up_to_symmetry(turn([1, 0, 0], 90), square_bar) == pytest.approx(np.pi / 2)
 
 
-def test_turns_about_an_axis_of_revolution_do_not_count():
+def test_turns_about_an_axis_of_revolution_do_not_count_and_the_least_angle_is_left():
     cone = {"symmetries_continuous": [{"axis": [0.0, 0.0, 1.0], "offset": [0.0, 0.0, 0.0]}]}
     tilted = turn([1, 0, 0], 25)
     angles = [bop.angle_up_to_symmetry(tilted @ turn([0, 0, 1], angle), cone) for angle in (0, 77, 180)]
@@ -147,9 +147,6 @@ def test_turns_about_an_axis_of_revolution_do_not_count():
     cylinder = cone | discrete(turn([1, 0, 0], 180))
     assert bop.angle_up_to_symmetry(turn([0, 1, 0], 170), cone) == pytest.approx(np.deg2rad(170))
     assert bop.angle_up_to_symmetry(turn([0, 1, 0], 170), cylinder) == pytest.approx(np.deg2rad(10))
-
-
-def test_the_closed_form_is_the_least_over_all_turns_about_the_axis():
     axis = np.array([2.0, -1.0, 2.0]) / 3
     found = {"symmetries_continuous": [{"axis": axis.tolist()}]}
     random = np.random.default_rng(0)

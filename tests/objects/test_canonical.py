@@ -69,7 +69,7 @@ def test_a_draw_depends_on_names_and_used_vertices_alone():
         assert np.array_equal(expected, actual)
 
 
-def test_cloud_keeps_all_points_and_looks_at_the_camera():
+def test_a_cloud_keeps_all_points_and_given_normals_or_looks_at_the_camera():
     surface = view()
     points_m, normals, diameter_m = canonical_cloud(surface, "source", 10)
     centre_m = (surface.vertices_m.min(axis=0) + surface.vertices_m.max(axis=0)) / 2
@@ -80,10 +80,6 @@ def test_cloud_keeps_all_points_and_looks_at_the_camera():
     assert np.linalg.norm(normals, axis=1) == pytest.approx(1, abs=1e-5)
     assert (np.einsum("pc,pc->p", normals, back_m) < 0).all()
     assert 0.1 < diameter_m < 0.2
-
-
-def test_cloud_keeps_given_normals_beside_their_points():
-    surface = view()
     given = surface.vertices_m / np.linalg.norm(surface.vertices_m, axis=1, keepdims=True)
     points_m, normals, _ = canonical_cloud(Surface("view", surface.vertices_m, None, given), "source")
     back_m = points_m + (surface.vertices_m.min(axis=0) + surface.vertices_m.max(axis=0)) / 2

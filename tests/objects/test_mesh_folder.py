@@ -104,7 +104,7 @@ def test_obj_with_two_materials_is_one_mesh(tmp_path):
     assert trimesh.Trimesh(surface.vertices_m, surface.faces).area == pytest.approx(1)
 
 
-def test_ply_without_faces_is_a_cloud(tmp_path, capsys):
+def test_ply_vtk_and_glb_without_faces_are_clouds(tmp_path, capsys):
     vertices, normals = np.random.default_rng(0).normal(size=(2, 70, 3))
     path = tmp_path / "cloud.ply"
     path.write_bytes(ascii_ply(vertices))
@@ -118,9 +118,6 @@ def test_ply_without_faces_is_a_cloud(tmp_path, capsys):
     path.write_bytes(ascii_ply(vertices, normals=normals))
     assert read(path).normals is None  # estimated where they are needed
     assert "cloud.ply: 1 of 70 normals are zero or NaN, so none of them is used" in capsys.readouterr().err
-
-
-def test_vtk_and_glb_without_faces_are_clouds(tmp_path):
     points = np.random.default_rng(0).normal(size=(70, 3))
     (tmp_path / "cloud.vtk").write_text(vtk_text(points))
     trimesh.PointCloud(points).export(tmp_path / "cloud.glb")

@@ -36,7 +36,7 @@ def test_a_sample_does_not_depend_on_how_many_there_are(objects, registrations):
             assert np.array_equal(getattr(one, name), getattr(other, name)), name
 
 
-def test_severities_are_recorded_for_the_concept_alone(registrations):
+def test_severities_are_recorded_for_the_concept_alone_and_hidden_without_labels(registrations):
     for name, concept in {"noise": "noise", "rotation_rad": "pose", "translation": "pose", "crop": "overlap"}.items():
         assert np.array_equal(getattr(registrations, f"severity_{name}") > 0, registrations.concept == concept)
     kept = np.diff(registrations.offsets)
@@ -45,6 +45,13 @@ def test_severities_are_recorded_for_the_concept_alone(registrations):
     assert angles == pytest.approx(registrations.severity_rotation_rad, abs=1e-7)
     shifts = np.linalg.norm(registrations.T_target_source_true[:, :3, 3], axis=1) / registrations.diameter_m
     assert shifts == pytest.approx(registrations.severity_translation)
+    blind = registrations.without_labels()
+    assert set(blind.concept) == {""}
+    for name in REGISTRATION_COLUMNS:
+        if name.startswith("severity_") or name == "T_target_source_true":
+            assert np.isnan(getattr(blind, name)).all()
+    for name in ("points", "offsets", "T_target_source_icp", "fitness", "sample"):
+        assert np.array_equal(getattr(blind, name), getattr(registrations, name))
 
 
 def test_poses_undone_the_clean_points_lie_on_the_object(objects, registrations):
@@ -98,16 +105,6 @@ def test_a_subset_keeps_every_rows_cloud_and_columns(registrations):
         assert chosen.embedding[new] == old
         for name in REGISTRATION_COLUMNS:
             assert np.array_equal(getattr(chosen, name)[new], getattr(registrations, name)[old])
-
-
-def test_without_labels_nothing_tells_the_perturbation(registrations):
-    blind = registrations.without_labels()
-    assert set(blind.concept) == {""}
-    for name in REGISTRATION_COLUMNS:
-        if name.startswith("severity_") or name == "T_target_source_true":
-            assert np.isnan(getattr(blind, name)).all()
-    for name in ("points", "offsets", "T_target_source_icp", "fitness", "sample"):
-        assert np.array_equal(getattr(blind, name), getattr(registrations, name))
 
 
 def test_registrations_survive_the_file(tmp_path, registrations):

@@ -39,7 +39,7 @@ def test_no_name_is_registered_twice_and_the_papers_tables_and_figures_are_marke
     assert paper == {*(f"table{n}" for n in range(1, 8)), *(f"fig{n}" for n in range(1, 7))}
 
 
-def test_files_are_listed_where_a_name_is_a_list_and_one_path_where_it_is_not():
+def test_files_are_listed_where_a_name_is_a_list_and_nothing_is_made_where_one_is_empty():
     entry = result(given("predictions/{source}/{explainer}/seed{seed}.csv"), only={"explainer": ("gpca", "gone")})
     assert entry.files(NAMES) == {
         "metrics": [f"predictions/{source}/gpca/seed{seed}.csv" for source in ("ycb", "mine") for seed in (0, 1)]
@@ -48,9 +48,6 @@ def test_files_are_listed_where_a_name_is_a_list_and_one_path_where_it_is_not():
     assert result(given("recovery/policy_seed{first_seed}.json")).files(NAMES)["metrics"].endswith("seed0.json")
     assert result().all_files == [f"tables/table9_mine.{suffix}" for suffix in ("md", "csv", "json")]
     assert result(kind="figures", name="fig").all_files == ["figures/fig.png", "figures/fig.pdf"]
-
-
-def test_a_result_of_which_a_name_is_empty_is_left_out():
     entry = result(given("predictions/{gpca}.csv"))
     assert entry.is_made(NAMES)
     assert not entry.is_made(NAMES | {"gpca": ""})

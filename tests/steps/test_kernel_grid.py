@@ -37,11 +37,17 @@ def grid(evaluated):
     return evaluated[0]
 
 
-def test_there_is_a_row_for_every_kernel_rate_and_count(grid):
+def test_there_is_a_row_for_every_kernel_rate_and_count_judged_by_the_predictions(grid, embedded, evaluated):
     assert list(grid.columns) == list(GRID_COLUMNS)
     assert len(grid) == 2 * 2 * 2
     assert not grid.duplicated(["kernel", "learning_rate", "iterations"]).any()
     assert np.isfinite(grid[list(GRID_COLUMNS[1:])].to_numpy()).all()
+    predictions = evaluated[1]
+    assert tuple(predictions.columns[:3]) == SETTING and len(predictions) == 8 * len(embedded.rows("test"))
+    right = predictions["concept_predicted"] == predictions["concept_true"]
+    shares = right.groupby([predictions[name] for name in SETTING], sort=False).mean()
+    assert shares.to_numpy().tolist() == grid["accuracy"].tolist()
+    assert set(predictions["cluster"]) == set(embedded.cluster[embedded.rows("test")])
 
 
 @pytest.mark.parametrize("row", range(8))
@@ -59,15 +65,6 @@ def test_every_row_is_that_of_a_fit_of_its_own(embedded, grid, row):
         calibration_error(scores, target),
         negative_log_likelihood(scores, target),
     ]
-
-
-def test_predictions_are_those_that_the_rows_are_judged_by(embedded, evaluated, grid):
-    predictions = evaluated[1]
-    assert tuple(predictions.columns[:3]) == SETTING and len(predictions) == 8 * len(embedded.rows("test"))
-    right = predictions["concept_predicted"] == predictions["concept_true"]
-    shares = right.groupby([predictions[name] for name in SETTING], sort=False).mean()
-    assert shares.to_numpy().tolist() == grid["accuracy"].tolist()
-    assert set(predictions["cluster"]) == set(embedded.cluster[embedded.rows("test")])
 
 
 def test_intervals_are_of_the_same_measures_over_families(evaluated, grid, tmp_path):

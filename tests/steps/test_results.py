@@ -41,14 +41,11 @@ def test_what_is_exchanged_follows_from_what_an_explainer_reads(made):
     assert set(rows["split"]) == {"test"}
 
 
-def test_curves_of_frame_labels_are_of_every_backbone_and_of_the_pair(made):
+def test_curves_of_labels_are_of_every_backbone_the_pair_and_a_rare_concept(made):
     rows = [line.split(",") for line in (made / "frame_all_labels.csv").read_text().splitlines()[1:]]
     assert {(row[0], row[1]) for row in rows} == {("dgcnn", "overlap"), ("pair", "overlap")}
     # None, and the whole pool: of 12 known samples 6, and 4 new ones, which are 40 % of it.
     assert [row[2] for row in rows] == ["0", "10", "0", "10"]
-
-
-def test_a_rare_concept_is_learned_beside_the_common_one(made):
     settings = [line.split(",")[0] for line in (made / "bald_kmeans.csv").read_text().splitlines()[1:]]
     assert set(settings) == {"pretrained", "unseen", "rare_20"}
     assert "rare_20" not in (made / "stream_bald.csv").read_text()

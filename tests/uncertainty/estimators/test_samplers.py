@@ -24,16 +24,13 @@ def whitened(covariance):
     return root @ covariance @ root.T
 
 
-def test_langevin_visits_a_gaussian_as_it_is():
+def test_langevin_and_stein_spread_as_the_gaussian_that_they_visit():
     random = np.random.default_rng(0)
     visited = posterior.langevin(slope, np.zeros((400, 6)), COVARIANCE, 500, 100, 0.1, random)
     assert (np.abs(visited.mean(axis=0) - MEAN) / np.sqrt(np.diag(COVARIANCE))).max() < 0.12
     # The steps make it larger by 1 / (1 - ε/4).
     assert whitened(np.cov(visited, rowvar=False)) == pytest.approx(np.eye(6) / (1 - 0.1 / 4), abs=0.06)
-
-
-def test_stein_particles_spread_as_a_gaussian():
-    """A hundred particles in six dimensions are known to spread too little; the shape is right."""
+    # A hundred particles in six dimensions are known to spread too little; the shape is right.
     start = np.random.default_rng(0).normal(size=(100, 6)) * 0.2
     ended = posterior.descend(slope, start, 600, 0.02)
     assert (np.abs(ended.mean(axis=0) - MEAN) / np.sqrt(np.diag(COVARIANCE))).max() < 0.15
