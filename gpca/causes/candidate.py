@@ -1,13 +1,9 @@
-"""Candidates, a model and an observed cloud with any subset of the causes, and their counterfactual registrations.
-
-A cause that is not there is small, not zero, or any trace of it would give away that it was applied. Lengths are in
-diameters. The observed cloud is kept in the model's frame, in which the true pose is the identity.
-"""
+"""Candidates, pairs with any subset of the causes, and their counterfactual registrations, in the model's frame."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from time import perf_counter
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 
@@ -27,13 +23,6 @@ from gpca.uncertainty.spread import Runs, divergence
 
 REPRODUCED = 1e-3  # diameters; points that are drawn again lie no farther from those of a file, which are rounded
 CAUSE_OF = {"noise": NOISE, "outliers": NOISE, "rotation_rad": POSE, "translation": POSE, "crop": OVERLAP}
-
-
-class MovingICP(Protocol):
-    """ICP to one target from many poses, such as :func:`icp_to`."""
-
-    def register(self, source: np.ndarray, T_n: np.ndarray, /) -> tuple[np.ndarray, ...]:
-        """Align points (N, 3) from poses (n, 4, 4): poses, fitness (n,), inlier RMSE (n,)."""
 
 
 def draw_applied(settings: CauseSettings, random: np.random.Generator) -> np.ndarray:
@@ -80,8 +69,8 @@ class Candidate:
         changing = {POSE: self.model_at_truth, OVERLAP: self.whole_model}
         return tuple(cause for cause in causes if changing.get(cause) is not None)
 
-    def icp(self, target: np.ndarray, causes: tuple[int, ...], settings: ICPSettings) -> MovingICP:
-        """Return the ICP to a target, which has these of the applied causes."""
+    def icp(self, target: np.ndarray, causes: tuple[int, ...], settings: ICPSettings) -> Any:
+        """Return the ICP to a target with these of the applied causes, such as that of :func:`icp_to`."""
         return icp_to(target, settings)
 
     def start(self, causes: tuple[int, ...]) -> np.ndarray:
@@ -94,12 +83,10 @@ def draw_candidate(
 ) -> Candidate:
     """Draw the points, of the object's (N, 3), and the severities of a candidate.
 
-    What is small is the same perturbation with a smaller severity, along the same axes. The number of points is that of
-    what remains, so that it tells nothing about missing surface. With partial models, overlap may be that the model
-    lacks surface, with or without that some is hidden in what was observed.
+    What is not applied is small, along the same axes; the number of points tells nothing about missing surface.
     """
     fewest, most = settings.points
-    form = DrawnForm.drawn(settings.form, random.spawn(1)[0])
+    form = DrawnForm(settings.form, random.spawn(1)[0])
     counts = np.exp(random.uniform(np.log(fewest), np.log(most), size=2)).round().astype(int)
     strong, small = (
         {part.name: random.uniform(*getattr(ranges, part.name)) for part in fields(ranges)}
@@ -124,7 +111,7 @@ def draw_candidate(
     T_near, T_init = (
         displacement(level["rotation_rad"] * axis, level["translation"] * direction) for level in (small, strong)
     )
-    whole_model = None
+    whole_model = None  # overlap may be that the model lacks surface, with or without that some is hidden
     if settings.partial and random.random() < settings.partial and applied[OVERLAP]:
         others = surface[np.concatenate([order[n_model + n_observed :], order[:n_model]])]
         left = others[what_remains(others, random.uniform(*settings.lacking), random)]
@@ -173,7 +160,7 @@ class Registrar:
     candidate: Candidate
     settings: CauseSettings
     misses: bool = False
-    _targets: dict[tuple[int, ...], MovingICP] = field(default_factory=dict)  # by the causes that change them
+    _targets: dict[tuple[int, ...], Any] = field(default_factory=dict)  # by the causes that change them
 
     def run(self, causes: tuple[int, ...], xi_n_6: np.ndarray) -> Runs:
         """Register with these causes, the observed to the model, from exp(ξ) T_init; may raise Unmeasurable."""
@@ -256,10 +243,9 @@ def replay(
 ) -> tuple[np.ndarray, list[np.ndarray]]:
     """Return a sample's model and, under each subset of its causes, the cloud where ICP put it from the start."""
     candidate, _ = drawn_again(objects, causes, row, source, seed, settings)
-    registrar = Registrar(candidate, settings)
-    observed = []
+    registrar, observed = Registrar(candidate, settings), []
     for subset in SUBSETS:
         applied = tuple(cause for cause in subset if candidate.applied[cause])
-        runs = registrar.run(applied, np.zeros((1, 6)))
-        observed.append(transform(runs.T_target_source_n[0], candidate.observed(applied)))
+        T_found = registrar.run(applied, np.zeros((1, 6))).T_target_source_n[0]
+        observed.append(transform(T_found, candidate.observed(applied)))
     return candidate.model, observed

@@ -1,8 +1,4 @@
-"""Descriptors of registered pairs in groups, the file that holds them, and what has to be seen for each.
-
-The group `remedied` has counterfactuals that anyone can make: the observed cloud is denoised, ICP starts from farther
-off, or roles are swapped. The result with all remedies stands for the unknown truth.
-"""
+"""Descriptors of registered pairs in groups, the file that holds them, and what has to be seen for each."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -33,11 +29,9 @@ def describe_remedied(pair: ObservedPair, settings: DescriptorSettings, icp: ICP
     observed = pair.observed[generator(*pair.axes, "remedies").permutation(len(pair.observed))]
     cleaned, model = denoise(observed), pair.model[: settings.icp_points]
     random = generator(*pair.axes, "restarts")
-    normal_k_6 = random.normal(size=(settings.starts, 6)), random.normal(size=(settings.restarts, 6))
-    twists = settings.twists(*normal_k_6)
-    for xi_k_6 in twists:
-        xi_k_6[0] = 0
-    near_k, far_k = (exp(xi_k_6) @ pair.T_init for xi_k_6 in twists)
+    near_k_6, far_k_6 = settings.twists(*(random.normal(size=(n, 6)) for n in (settings.starts, settings.restarts)))
+    near_k_6[0] = far_k_6[0] = 0
+    near_k, far_k = exp(near_k_6) @ pair.T_init, exp(far_k_6) @ pair.T_init
     counted, best_8, cost_8, fitness_8 = [], [], [], []
     for alone in SUBSETS:
         cloud = (observed if NOISE in alone else cleaned)[: settings.icp_points]
@@ -133,18 +127,12 @@ def observed_pair(causes: Causes, row: int, *axes: object) -> ObservedPair:
 
 def describe_motion(pair: ObservedPair) -> np.ndarray:
     """Return the numbers of :data:`gpca.causes.settings.MOTION`, in radians and diameters."""
-    moved = log(inverse(pair.T_init)[None])[0]
     covariance = np.cov(log(pair.T_runs), rowvar=False)
-    variance_6 = np.diag(covariance)
-    return np.array(
-        [
-            *(np.sqrt(np.square(moved[:3]).sum()), np.sqrt(np.square(moved[3:]).sum())),
-            displacements(pair.T_init[None], pair.observed)[0],
-            *(pair.fitness_n[0], pair.inlier_rmse_n[0]),
-            *(np.sqrt(variance_6[:3].sum()), np.sqrt(variance_6[3:].sum())),
-            np.linalg.slogdet(covariance + SPREAD_FLOOR * np.eye(6))[1],
-        ]
-    )
+    moved_2 = np.sqrt(np.square(log(inverse(pair.T_init)[None])[0]).reshape(2, 3).sum(axis=1))  # rotation, translation
+    spread_2 = np.sqrt(np.diag(covariance).reshape(2, 3).sum(axis=1))
+    displacement = displacements(pair.T_init[None], pair.observed)[0]
+    log_determinant = np.linalg.slogdet(covariance + SPREAD_FLOOR * np.eye(6))[1]
+    return np.array([*moved_2, displacement, pair.fitness_n[0], pair.inlier_rmse_n[0], *spread_2, log_determinant])
 
 
 def describe_starts(pair: ObservedPair, icp: ICPSettings) -> np.ndarray:
@@ -152,24 +140,18 @@ def describe_starts(pair: ObservedPair, icp: ICPSettings) -> np.ndarray:
     cost_n = pair.cost_n(icp)
     best = cost_n.argmin()
     moved_n = displacements(pair.T_runs, pair.observed)
-    return np.array(
-        [
-            *(cost_n[0], cost_n[best], cost_n[0] - cost_n[best]),
-            np.log(max(cost_n[0], SMALLEST_COST) / max(cost_n[best], SMALLEST_COST)),
-            *(moved_n[best], moved_n.mean()),
-            *np.quantile(moved_n, QUARTERS),
-            cost_n.std(),
-            *np.quantile(pair.fitness_n, ENDS),
-            *np.quantile(pair.inlier_rmse_n, ENDS),
-        ]
-    )
+    log_gain = np.log(max(cost_n[0], SMALLEST_COST) / max(cost_n[best], SMALLEST_COST))
+    costs = (cost_n[0], cost_n[best], cost_n[0] - cost_n[best], log_gain)
+    moved = (moved_n[best], moved_n.mean(), *np.quantile(moved_n, QUARTERS))
+    fits = (*np.quantile(pair.fitness_n, ENDS), *np.quantile(pair.inlier_rmse_n, ENDS))
+    return np.array([*costs, *moved, cost_n.std(), *fits])
 
 
 def describe_plainly(pair: ObservedPair, icp: ICPSettings) -> dict[str, np.ndarray]:
     """Return the groups of a pair that are quick to measure: distances, planes, motion and starts."""
     distances, planes = describe_distances(pair)
-    quick = {"distances": distances, "planes": planes, "motion": describe_motion(pair)}
-    return quick | {"starts": describe_starts(pair, icp)}
+    motion, starts = describe_motion(pair), describe_starts(pair, icp)
+    return {"distances": distances, "planes": planes, "motion": motion, "starts": starts}
 
 
 def describe(pair: ObservedPair, settings: DescriptorSettings, icp: ICPSettings) -> tuple[dict[str, np.ndarray], float]:

@@ -115,10 +115,7 @@ ENDS = (NONE,) * ALL + (ALL,)  # they tell the state, and so whether the others 
 def draw_causes(
     objects: ObjectClouds, source: str, seed: int, settings: CauseSettings
 ) -> tuple[Causes, Tally, np.ndarray]:
-    """Draw candidates and keep those that are wanted; return them, the tally, and the seconds (S,) of ICP.
-
-    Source, seed, split and number name a candidate's random numbers. InputError for a group that cannot be filled.
-    """
+    """Return candidates that are wanted, the tally, and the seconds (S,) of ICP; InputError for an unfilled group."""
     drawing = _Drawing(objects, source, seed, settings)
     records = [record for split in SPLITS for record in drawing.of_split(split)]
     causes, icp_seconds_S = as_causes(records, (source, seed))
@@ -166,9 +163,8 @@ class _Drawing:
         every: bool = False,
     ) -> None:
         subjects, uncertainty_limit = measure_clean_pairs(read_subjects(objects), source, seed, settings)
-        self._subjects = dict.fromkeys(SPLITS, subjects)
-        if not every:
-            self._subjects = split_by_object(subjects, source, seed, settings)
+        whole = dict.fromkeys(SPLITS, subjects)
+        self._subjects = whole if every else split_by_object(subjects, source, seed, settings)
         self._settings = drawn_by or settings
         self._measuring = Measuring(self._settings, uncertainty_limit)
         self._axes, self._part = (source, seed), part
@@ -186,8 +182,8 @@ class _Drawing:
     def up_to(self, most: int, split: str, quotas: Quotas) -> list[dict[str, Any]]:
         """Return the rows that are wanted of so many candidates, or of fewer where nothing is wanted any more."""
         records: list[dict[str, Any]] = []
-        source, seed = self._axes
-        for number in progress(range(most), f"candidates of {source}, seed {seed}, {split}", total=None):
+        title = "candidates of {}, seed {}, {}".format(*self._axes, split)
+        for number in progress(range(most), title, total=None):
             subject = self._subjects[split][number % len(self._subjects[split])]
             record, group = self._try(split, number, subject, quotas)
             self.tally[split, subject.name, *group, record is not None] += 1

@@ -3,10 +3,6 @@
 Lengths are in diameters. Each form draws from a generator of its own, so that samples of two forms are otherwise alike.
 """
 
-from __future__ import annotations
-
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -21,21 +17,14 @@ CLUSTER = 0.03  # standard deviation of a cluster of outliers, per axis
 TABLE = 0.6  # radius of the part of a table that is observed
 
 
-@dataclass(frozen=True)
 class DrawnForm:
     """A form with what it draws for a candidate."""
 
-    form: Form
-    factor: float  # how many times as large the model is as the object
-    toward: np.ndarray  # (3,) along which the model ends and depth is measured
-    down: np.ndarray  # (3,) to the table
-    random: np.random.Generator
-
-    @classmethod
-    def drawn(cls, form: Form, random: np.random.Generator) -> DrawnForm:
-        """Draw the directions, and whether the model is too large or too small."""
-        factor = (1 + form.scale) ** float(random.choice([-1, 1]))
-        return cls(form, factor, random_direction(random), random_direction(random), random)
+    def __init__(self, form: Form, random: np.random.Generator) -> None:
+        self.form, self.random = form, random
+        self.factor = (1 + form.scale) ** float(random.choice([-1, 1]))  # times as large the model is as the object
+        self.toward = random_direction(random)  # along which the model ends and depth is measured
+        self.down = random_direction(random)  # to the table
 
     def model_and_observed(
         self, surface: np.ndarray, order: np.ndarray, n_model: int, n_observed: int
@@ -98,8 +87,8 @@ def visible_rows(points: np.ndarray, toward: np.ndarray) -> np.ndarray:
 
 def what_remains(points: np.ndarray, lacking: float, random: np.random.Generator) -> np.ndarray:
     """Return rows, in random order, of points (N, 3) in random order that a partial model has."""
-    toward, of_one_side = random_direction(random), random.random() < 0.5
-    if of_one_side:
+    toward = random_direction(random)
+    if random.random() < 0.5:
         return random.permutation(visible_rows(points, -toward))
     return random.permutation(within_half_space(points @ toward, lacking, FEWEST_POINTS))
 
@@ -109,7 +98,6 @@ def smooth_field(points: np.ndarray, random: np.random.Generator) -> np.ndarray:
     frequency, phase = random.normal(size=(3, WAVES)), random.uniform(0, 2 * np.pi, WAVES)
     field = np.cos(2 * np.pi * points @ frequency + phase) @ random.normal(size=(WAVES, 3))
     turns = np.stack([np.cross(axis, points) for axis in np.eye(3)], axis=2)  # (N, 3, 3), the last is the motion
-    shifts = np.broadcast_to(np.eye(3), turns.shape)
-    motions = np.concatenate([turns, shifts], axis=2).reshape(-1, 6)
+    motions = np.concatenate([turns, np.broadcast_to(np.eye(3), turns.shape)], axis=2).reshape(-1, 6)
     field = field - (motions @ np.linalg.lstsq(motions, field.ravel(), rcond=None)[0]).reshape(field.shape)
     return field / np.sqrt(np.square(field).mean())

@@ -1,9 +1,4 @@
-"""Registrations of depth frames whose causes are measured: nothing about them was simulated.
-
-Noise is taken away by where the rays of the same pixels meet the mesh at the true pose; missing surface, by the whole
-side that the camera would see; a pose error, by a start from the true pose. The model is what the camera would see at
-the pose that ICP starts from: the side that an object hides by itself counts as no cause.
-"""
+"""Registrations of depth frames whose causes are measured, as docs/appendix.md says: nothing was simulated."""
 
 from collections.abc import Mapping
 
@@ -34,10 +29,7 @@ def chosen_starts(starts: Starts, instances: Instances, source: str, settings: F
     chosen: list[int] = []
     for kind in KINDS:
         rows = generator(source, "frame causes", kind).permutation(np.flatnonzero(is_tested_K & (starts.kind == kind)))
-        turn = np.zeros(len(rows), int)
-        for scene in np.unique(scene_K[rows]):
-            of_scene = scene_K[rows] == scene
-            turn[of_scene] = np.arange(of_scene.sum())
+        turn = pd.Series(scene_K[rows]).groupby(scene_K[rows]).cumcount()  # of each within its scene
         chosen += np.sort(rows[np.argsort(turn, kind="stable")][: settings.starts]).tolist()
     return starts.subset(np.array(chosen, int))
 
@@ -71,12 +63,11 @@ def measure_frames(
     nothing = ("no instance in the frames can be measured", "check the meshes and poses")
     cases = map(case, progress(range(len(starts)), f"causes of {source}, seed {seed}"))
     causes = measure_cases(cases, Measuring(settings, limit), (source, seed), nothing)
-    registrations, (severities, found) = causes.registrations, found_in(causes)
-    started = starts.subset(registrations.sample)
-    seen = {"instance": started.instance, "start": started.kind, "init_from": started.init_from}
+    sample_S, (severities, found) = causes.registrations.sample, found_in(causes)
+    started = starts.subset(sample_S)
+    seen = {"sample": sample_S, "instance": started.instance, "start": started.kind, "init_from": started.init_from}
     seen |= {name: getattr(instances, name)[started.instance] for name in ("dataset", "scene", "image")}
-    samples = {"sample": registrations.sample, **seen, "object": registrations.object_name}
-    return causes, pd.DataFrame({**samples, **severities, **found})
+    return causes, pd.DataFrame({**seen, "object": causes.registrations.object_name, **severities, **found})
 
 
 def frame_candidate(
@@ -89,9 +80,8 @@ def frame_candidate(
     random: np.random.Generator,
 ) -> Candidate:
     """Return an instance started at ``T_camera_object``, with all that may be taken away; may raise Unmeasurable."""
-    diameter_m, sighting = subject.diameter_m, instances.sighting(i)
+    diameter_m, sighting, outline_m = subject.diameter_m, instances.sighting(i), outline(subject)
     T_true = instances.T_camera_object_true[i]
-    outline_m = outline(subject)
     if (view := clean_view(sighting, T_true, mesh, outline_m)) is None:
         raise Unmeasurable("its pixels show none of the mesh at the true pose")
     sides_m = [rendered_side(mesh, sighting.camera_3_3, T, outline_m)[0] for T in (T_init, T_true)]

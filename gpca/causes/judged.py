@@ -1,7 +1,4 @@
-"""Test samples with their truth and an explainer's predictions, and the measures of a diagnosis.
-
-Measures take weights (B, N) of the samples, and return B values, NaN where none counts.
-"""
+"""Test samples with their truth and an explainer's predictions, and the measures (B,) of a diagnosis."""
 
 from __future__ import annotations
 
@@ -111,7 +108,7 @@ def ceiling_of(tested: Causes | SampleTruth, seed: int) -> Judged:
     again = tested.truth_again
     error_N = again.error[:, -1]
     shares_N_3 = np.maximum(again.phi, 0) + 1e-12
-    shares_N_3 = shares_N_3 / shares_N_3.sum(axis=1, keepdims=True)
+    shares_N_3 /= shares_N_3.sum(axis=1, keepdims=True)
     # A sample that lies between the limits this time is named by the nearer one.
     is_nominal_N = error_N < (again.nominal_limit + again.failed_limit) / 2
     scores_N_4 = np.column_stack([is_nominal_N.astype(float), ~is_nominal_N[:, None] * shares_N_3])

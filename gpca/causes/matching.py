@@ -1,10 +1,4 @@
-"""Matches samples by their trivial numbers, so that these know nothing of the dominant cause (docs/appendix.md).
-
-Let g(c | x) be the probability of a cause, were all equally frequent, of a candidate with trivial numbers x. Accepting
-candidates of cause c with probability min g / g(c) leaves every cause with the same distribution of x; where min g is
-below `LEAST`, which hardly any would pass, none is measured. g is a logistic regression on x, its squares and products,
-fitted by ``benchmarks/hard.py`` to development objects and seeds.
-"""
+"""Matches samples by their trivial numbers, so that these know nothing of the dominant cause (docs/appendix.md)."""
 
 from __future__ import annotations
 
@@ -26,7 +20,7 @@ FILE = Path(__file__).with_suffix(".csv")
 COLUMNS = ("term", "center", "scale", *CONCEPTS)
 INTERCEPT = "1"
 FARTHEST = 4.0  # scales, to which the numbers are clipped
-LEAST = 0.1  # probability of the least probable cause
+LEAST = 0.1  # probability of the least probable cause; below that, hardly any candidate would pass
 DIGITS = 9  # of a probability, so that the last ones of a processor decide nothing
 
 

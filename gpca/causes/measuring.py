@@ -58,8 +58,8 @@ class Subject:
 
 def read_subjects(objects: ObjectClouds) -> list[Subject]:
     """Return the objects, with errors that respect their symmetries."""
-    symmetries = (find_symmetries(objects.points(i), float(objects.diameters_m[i])) for i in range(len(objects)))
-    return [Subject.of(objects, i, bool(symmetric)) for i, symmetric in enumerate(symmetries)]
+    sizes = enumerate(objects.diameters_m.tolist())
+    return [Subject.of(objects, i, bool(find_symmetries(objects.points(i), size_m))) for i, size_m in sizes]
 
 
 def split_by_object(
@@ -73,17 +73,16 @@ def split_by_object(
     is_test_N = unseen(np.array([subject.fold for subject in subjects]), seed)
     if is_test_N is None:
         is_test_N = drawn(family_N, settings.test_objects, source, seed, "causes", "objects")
-    rows = (np.flatnonzero(~is_test_N), np.flatnonzero(is_test_N))
-    return {split: [subjects[row] for row in own] for split, own in zip(SPLITS, rows, strict=True)}
+    halves = ((split, np.flatnonzero(is_test_N == (split == "test"))) for split in SPLITS)
+    return {split: [subjects[row] for row in rows] for split, rows in halves}
 
 
 def measure_clean_pairs(
     subjects: list[Subject], source: str, seed: int, settings: CauseSettings
 ) -> tuple[list[Subject], float]:
-    """Measure clean pairs, of which no cause is more than small.
+    """Return the subjects, without those of which nearly all clean pairs are off, and the limit of the uncertainty.
 
-    Return the subjects, without those of which nearly all pairs are off, and the limit of the uncertainty: a quantile
-    of the divergence between two clean pairs of one object, with equal numbers of points, from the same starts.
+    It is a quantile of the divergence between two clean pairs of one object, as large, from the same starts.
     """
     off = f"an error of at least {100 * settings.limits.nominal:g} % of the diameter or cannot be registered"
     nominal, count = settings.limits.nominal, -(-settings.clean_pairs // len(subjects))
@@ -198,12 +197,10 @@ def measure_cases(cases: Iterable[RecordedPair], measuring: Measuring, axes: Axe
         try:
             candidate, subject = case.make()
             registrar = Registrar(candidate, measuring.settings, misses=True)
-            truth, again = (
-                measuring.truth(measuring.counterfactuals(registrar, subject, case.axes, starts))
-                for starts in ("starts", "other starts")
-            )
-            record = {**measuring.observed(registrar, subject, case.axes), "truth": truth, "again": again}
-            records.append(record | {"sample": case.sample, "split": "test", "candidate": case.candidate})
+            record: dict[str, Any] = {"sample": case.sample, "split": "test", "candidate": case.candidate}
+            for name, starts in (("truth", "starts"), ("again", "other starts")):
+                record[name] = measuring.truth(measuring.counterfactuals(registrar, subject, case.axes, starts))
+            records.append(record | measuring.observed(registrar, subject, case.axes))
         except Unmeasurable as fault:
             print(f"causes of {axes[0]}: {case.name} is skipped: {fault}", file=sys.stderr)
     if not records:
@@ -224,16 +221,15 @@ def found_in(causes: Causes) -> tuple[dict[str, Any], dict[str, Any]]:
 def as_causes(records: list[dict[str, Any]], axes: Axes) -> tuple[Causes, np.ndarray]:
     """Return rows as registrations with their truth, and the seconds (S,) that ICP took for each."""
 
-    def joined(truths: list[Truth]) -> Truth:
-        error_S_8 = np.concatenate([np.empty((0, len(SUBSETS))), *(each.error for each in truths)])
-        uncertainty_S_8 = np.concatenate([np.empty((0, len(SUBSETS))), *(each.uncertainty for each in truths)])
+    def joined(name: str) -> Truth:
+        truths = [record[name] for record in records if name in record]
+        error_S_8 = np.array([each.error[0] for each in truths]).reshape(-1, len(SUBSETS))
+        uncertainty_S_8 = np.array([each.uncertainty[0] for each in truths]).reshape(-1, len(SUBSETS))
         return replace(records[0]["truth"], error=error_S_8, uncertainty=uncertainty_S_8)
 
-    truth = joined([record["truth"] for record in records])
-    concept_S = np.array(CONCEPTS)[truth.phi.argmax(axis=1)]
-    registrations, icp_seconds_S = as_registrations(
-        [record | {"concept": concept} for record, concept in zip(records, concept_S, strict=True)], axes
-    )
+    truth = joined("truth")
+    for record, concept in zip(records, np.array(CONCEPTS)[truth.phi.argmax(axis=1)], strict=True):
+        record["concept"] = concept
+    registrations, icp_seconds_S = as_registrations(records, axes)
     columns: dict[str, Any] = {name: np.array([record[name] for record in records]) for name in Causes.array_fields()}
-    again = joined([record["again"] for record in records if "again" in record])
-    return Causes(registrations=registrations, **columns, truth=truth, truth_again=again), icp_seconds_S
+    return Causes(registrations=registrations, **columns, truth=truth, truth_again=joined("again")), icp_seconds_S

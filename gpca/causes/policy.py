@@ -75,11 +75,7 @@ class RecoveryPolicy:
     def decide(
         self, scores_C: np.ndarray, bald: float = 0, before: Sequence[Treated] = (), concepts: Sequence[str] = CONCEPTS
     ) -> Decision:
-        """Choose the branch of a case by scores ŝ_c that sum to one, and BALD in nats; 0 for explainers without one.
-
-        Concepts whose treatment improved too little come last, the least often treated first; otherwise, the largest
-        score leads.
-        """
+        """Choose the branch of a case by scores ŝ_c that sum to one, and BALD in nats; 0 for explainers without one."""
         limits = self.thresholds
         stale = [treated.concept for treated in before if treated.fall < limits.improvement]
         if len(stale) >= limits.attempts:
@@ -92,6 +88,7 @@ class RecoveryPolicy:
         treatable = [c for c, concept in enumerate(concepts) if concept in self.treatments]
         if not treatable or top not in treatable:
             return Decision(QUEUE, "", f"no action treats {concepts[top]}")
+        # Concepts whose treatment improved too little come last, the least often treated first.
         chosen = concepts[min(treatable, key=lambda c: (stale.count(concepts[c]), -scores_C[c]))]
         return Decision(self.treatments[chosen], chosen, f"{chosen} has {scores_C[concepts.index(chosen)]:.2f}")
 

@@ -1,9 +1,4 @@
-"""Registrations of scans to scans whose causes are measured: real sensors, real overlap.
-
-The pose error can be taken away, and so can what only one scan sees. Measured noise cannot, so as a cause it is an
-addition, in multiples of the sensor's. Errors are root mean square distances over the surface that both truly have in
-common, scaled so that the limit of success is that of all other experiments (docs/appendix.md).
-"""
+"""Registrations of scans to scans whose causes are measured (docs/appendix.md): real sensors, real overlap."""
 
 from __future__ import annotations
 
@@ -24,10 +19,10 @@ from gpca.causes.settings import FEWEST_POINTS, CauseSettings
 from gpca.causes.truth import NONE
 from gpca.io.frame import Frame
 from gpca.objects.canonical import DRAWN
-from gpca.pairs.perturbation import CONCEPTS, NOISE, OVERLAP, POSE
+from gpca.pairs.perturbation import NOISE, OVERLAP, POSE
 from gpca.process.progress import progress
 from gpca.rigid import dots, inverse, inverses, rigid_motion, rotate, rotation_angle_rad, transform
-from gpca.scans.pair import ROOM_M, ScanPair, ScanSuccess
+from gpca.scans.pair import ScanPair, ScanSuccess
 from gpca.scans.scene import ScanPairs
 from gpca.seeds import generator
 from gpca.uncertainty.spread import divergence
@@ -67,7 +62,7 @@ class OverlapErrors:
 
 @dataclass(frozen=True)
 class DrawnScans:
-    """Some points of both scans, where they truly lie, in the target's frame about its middle, in :attr:`unit_m`."""
+    """Some points of both scans, where they truly lie, in the target's frame about its middle, in its unit."""
 
     pair: ScanPair
     source: np.ndarray  # (N, 3)
@@ -81,7 +76,7 @@ class DrawnScans:
         """Draw points of each scan, at most so many; an RMSE of `limit_m` is to be an error of `failed`."""
         clouds = (pair.source_N_3, pair.target_M_3)
         rows_N, rows_M = (np.sort(random.permutation(len(cloud))[:points]) for cloud in clouds)
-        center_3, unit_m = middle(pair), unit_of(pair)
+        center_3, unit_m = pair.middle_3, pair.unit_m
         return cls(
             pair=pair,
             source=(transform(pair.T_target_source, pair.source_N_3[rows_N].astype(np.float64)) - center_3) / unit_m,
@@ -92,11 +87,6 @@ class DrawnScans:
         )
 
     @cached_property
-    def unit_m(self) -> float:
-        """The usual size of what is scanned, in meters."""
-        return unit_of(self.pair)
-
-    @cached_property
     def errors(self) -> OverlapErrors:
         """The errors of poses."""
         return OverlapErrors(self.source[self.source_common][:JUDGED_POINTS], self.error_factor)
@@ -104,7 +94,7 @@ class DrawnScans:
     @cached_property
     def sensor_noise(self) -> float:
         """The standard deviation of a measured point across its surface (:func:`sensor_noise_m`)."""
-        return sensor_noise_m(self.pair) / self.unit_m
+        return sensor_noise_m(self.pair) / self.pair.unit_m
 
     def candidate(self, T_target_source_init: np.ndarray, times: float, random: np.random.Generator) -> ScanCandidate:
         """Return the pair started at a pose in meters, with so many times the sensor's noise added to both scans."""
@@ -112,10 +102,8 @@ class DrawnScans:
         jitter_N, jitter_M = (noise * random.normal(size=cloud.shape) for cloud in (self.source, self.target))
         T_init = motion_between(self.pair, self.pair.T_target_source, T_target_source_init)
         middle_3 = self.source.mean(axis=0)
-        applied = np.ones(len(CONCEPTS), bool)
-        applied[NOISE] = times > 0
         return ScanCandidate(
-            applied=applied,
+            applied=np.array([times > 0, True, True]),  # noise, pose, overlap
             model=self.target,
             clean=self.source,
             noisy=self.source + jitter_N,
@@ -137,19 +125,9 @@ class DrawnScans:
 
 def motion_between(pair: ScanPair, T_target_source_from: np.ndarray, T_target_source_to: np.ndarray) -> np.ndarray:
     """Return the motion (4×4) of the source between two poses in meters, in the frame in which a pair is registered."""
-    T_m, center_3 = T_target_source_to @ inverse(T_target_source_from), middle(pair)
+    T_m, center_3 = T_target_source_to @ inverse(T_target_source_from), pair.middle_3
     # Poses of data sets are rounded, so that the last row of a product may not be exact.
-    return rigid_motion(T_m[:3, :3], (rotate(T_m, center_3) + T_m[:3, 3] - center_3) / unit_of(pair))
-
-
-def unit_of(pair: ScanPair) -> float:
-    """Return the length, in meters, that counts as the diameter of whole objects does: the usual size of a scan."""
-    return ROOM_M * pair.scale
-
-
-def middle(pair: ScanPair) -> np.ndarray:
-    """Return the middle (3,) of the box around the target, in meters."""
-    return (pair.target_M_3.min(axis=0).astype(np.float64) + pair.target_M_3.max(axis=0)) / 2
+    return rigid_motion(T_m[:3, :3], (rotate(T_m, center_3) + T_m[:3, 3] - center_3) / pair.unit_m)
 
 
 def sensor_noise_m(pair: ScanPair) -> float:
@@ -212,9 +190,9 @@ def measure_scans(
 
         def candidate() -> tuple[Candidate, Subject]:
             random = generator(*axes, "noise", start.times)
-            unit_m, errors = scans.unit_m, scans.errors
             # The pair stands in the place of an object, and its scene in that of a family.
-            subject = Subject(start.pair, pair.name, unit_m, scans.target, False, errors, pair.cluster, DRAWN)
+            about = pair.unit_m, scans.target, False, scans.errors, pair.cluster, DRAWN
+            subject = Subject(start.pair, pair.name, *about)
             return scans.candidate(start.T_target_source, start.times, random), subject
 
         return RecordedPair(number, number, f"pair {pair.name} ({start.kind}, {start.init_from})", axes, candidate)
@@ -223,10 +201,11 @@ def measure_scans(
     cases = (case(number) for number in numbers if starts[number].pair in drawn)
     nothing = ("no registration of the scans can be measured", "check their poses")
     causes = measure_cases(cases, measuring, (source, seed), nothing)
-    registrations, (severities, found) = causes.registrations, found_in(causes)
-    measured = [starts[number] for number in registrations.sample]
+    sample_S, (severities, found) = causes.registrations.sample, found_in(causes)
+    measured = [starts[number] for number in sample_S]
     scans_S = [drawn[start.pair] for start in measured]
-    columns = {"pair": [each.pair.name for each in scans_S], "cluster": registrations.cluster}
+    columns = {"sample": sample_S, "pair": [each.pair.name for each in scans_S]}
+    columns |= {"cluster": causes.registrations.cluster}
     columns |= {name: [getattr(each.pair, name) for each in scans_S] for name in ("kind", "overlap")}
     columns |= {"start": [start.kind for start in measured], "init_from": [start.init_from for start in measured]}
     columns |= {"times": [start.times for start in measured], "sensor_noise": [each.sensor_noise for each in scans_S]}
@@ -242,11 +221,10 @@ def measure_scans(
         except Unmeasurable:
             return ""
 
-    natural = [start.kind == GLOBAL and not start.times for start in measured]
-    numbered = zip(registrations.sample.tolist(), natural, strict=True)
-    found["dominant_one_sided"] = [one_sided(number) if is_natural else "" for number, is_natural in numbered]
-    factors = {"error_factor": [each.error_factor for each in scans_S]}
-    return causes, pd.DataFrame({"sample": registrations.sample, **columns, **severities, **found, **factors})
+    is_natural = {number: starts[number].kind == GLOBAL and not starts[number].times for number in sample_S.tolist()}
+    found["dominant_one_sided"] = [one_sided(number) if natural else "" for number, natural in is_natural.items()]
+    found["error_factor"] = [each.error_factor for each in scans_S]
+    return causes, pd.DataFrame({**columns, **severities, **found})
 
 
 def _clean_uncertainty(scans: DrawnScans, others: DrawnScans, axes: tuple, settings: CauseSettings) -> float:

@@ -1,7 +1,4 @@
-"""Depth frames in the layout of the BOP benchmark, lengths in meters instead of millimeters.
-
-Format: https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_format.md.
-"""
+"""Depth frames in the layout of the BOP benchmark, lengths in meters instead of millimeters."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -39,8 +36,7 @@ def read_images(path: Path) -> dict[int, Any]:
 
 def read_camera(entry: Any, subject: str) -> tuple[np.ndarray, float]:
     """Return K (3, 3) in pixels and the millimeters per unit of depth; InputError for impossible values."""
-    camera_3_3 = _numbers(entry, "cam_K", 9, subject).reshape(3, 3)
-    matrix_subject = f"{subject}: cam_K"
+    camera_3_3, matrix_subject = _numbers(entry, "cam_K", 9, subject).reshape(3, 3), f"{subject}: cam_K"
     if abs(camera_3_3[[1, 2, 2], [0, 0, 1]]).max() > 1e-6 or abs(camera_3_3[2, 2] - 1) > 1e-6:
         raise InputError(matrix_subject, "is not a camera matrix", "give fx s cx, 0 fy cy, 0 0 1, row by row")
     focal_px, (nearest_px, farthest_px) = np.diag(camera_3_3)[:2], FOCAL_PX

@@ -1,7 +1,4 @@
-"""Initial poses of ICP in frames: results of pose estimators, the truth with a declared error, or features.
-
-A pose error is ``T_true_estimated`` in the frame of the object's model: what takes the true pose to the estimated one.
-"""
+"""Initial poses of ICP in frames: results of pose estimators, the truth with a declared error, or features."""
 
 from __future__ import annotations
 
@@ -17,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from gpca.errors import InputError, refusing
 from gpca.io.csv_file import ANY, numbers, read_csv
 from gpca.numerals import decimal, whole
+from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.perturbation import HalfTurn, Shift
 from gpca.process.environment import open3d_cloud, require_open3d
 from gpca.rigid import inverse, random_direction, require_rotation, rigid_motion, rotate, transform
@@ -169,17 +167,15 @@ class GlobalRegistration:
     Of several runs, the best has most points on the model plus most points that face the camera and were measured.
     """
 
-    def __init__(self, points_m: np.ndarray, normals: np.ndarray, diameter_m: float, settings: InitialPoseSettings):
-        self._o3d = require_open3d()
-        self._settings = settings
-        self._voxel_m = settings.voxel * diameter_m
-        self._model = self._features(open3d_cloud(points_m, normals))
+    def __init__(self, objects: ObjectClouds, index: int, settings: InitialPoseSettings) -> None:
+        self._o3d, self._settings = require_open3d(), settings
+        self._voxel_m = settings.voxel * float(objects.diameters_m[index])
+        self._model = self._features(open3d_cloud(objects.points(index), objects.normals_of(index)))
 
     def register(self, points_m: np.ndarray, seed: int) -> np.ndarray:
         """Return ``T_camera_object`` of points (P, 3) in the camera's frame, repeatable where Open3D has one thread."""
-        o3d = self._o3d
+        o3d, cloud = self._o3d, open3d_cloud(points_m)
         registration = o3d.pipelines.registration
-        cloud = open3d_cloud(points_m)
         cloud.estimate_normals(o3d.geometry.KDTreeSearchParamHybrid(radius=2 * self._voxel_m, max_nn=30))
         cloud.orient_normals_towards_camera_location(np.zeros(3))
         (source, source_features), (model, model_features) = self._features(cloud), self._model

@@ -147,19 +147,11 @@ def read_instances(
                 except TooFewPoints as fault:
                     left_out.append(str(fault))
                     continue
-                row = {
-                    "dataset": dataset.name,
-                    "scene": frame.scene,
-                    "image": frame.image,
-                    "camera_3_3": frame.camera_3_3,
-                    "colour": str(frame.color or NO_COLOR),
-                    "fold": dataset.fold(frame.scene),
-                    "object_index": index[number],
-                    "symmetric": symmetric[number],
-                    "T_camera_object_true": at[1],
-                    "points_m": points_m.astype(np.float32),
-                    "pixels": pixels.astype(np.int32),
-                }
+                row: dict[str, Any] = {"dataset": dataset.name, "scene": frame.scene, "image": frame.image}
+                row |= {"camera_3_3": frame.camera_3_3, "colour": str(frame.color or NO_COLOR)}
+                row |= {"fold": dataset.fold(frame.scene), "object_index": index[number]}
+                row |= {"symmetric": symmetric[number], "T_camera_object_true": at[1]}
+                row |= {"points_m": points_m.astype(np.float32), "pixels": pixels.astype(np.int32)}
                 seen.append(_Seen(frame, n, T_model_object, diameter_m, row))
                 some_m = spread(row["points_m"], JUDGED_POINTS)
                 off.append((median_distance(*at, some_m), diameter_m))
@@ -176,10 +168,8 @@ def read_instances(
     columns = {name: np.array([of.row[name] for of in seen]) for name in seen[0].row if name not in PARTS}
     columns |= {name: np.concatenate([of.row[name] for of in seen]) for name in PARTS}
     columns["offsets"] = np.cumsum([0, *(len(of.row["points_m"]) for of in seen)], dtype=np.int64)
-    init_from, T_camera_object_init = zip(*poses, strict=True)
-    return Instances(
-        axes=None, **columns, init_from=np.array(init_from), T_camera_object_init=np.array(T_camera_object_init)
-    )
+    columns["init_from"], columns["T_camera_object_init"] = map(np.array, zip(*poses, strict=True))
+    return Instances(axes=None, **columns)
 
 
 PARTS = {"points_m", "pixels"}
@@ -214,8 +204,7 @@ def _poses(
         else:
             key = row["dataset"], of.annotation.object_id
             if key not in registration:
-                points_m, normals = objects.points(row["object_index"]), objects.normals_of(row["object_index"])
-                registration[key] = initial_pose.GlobalRegistration(points_m, normals, of.diameter_m, settings)
+                registration[key] = initial_pose.GlobalRegistration(objects, row["object_index"], settings)
             T_init = registration[key].register(row["points_m"], seed_of(*axes))
         poses.append((settings.form, T_init))
     return poses

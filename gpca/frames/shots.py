@@ -152,21 +152,16 @@ def agreement(
     T_world_object: np.ndarray,
     diameter_m: float,
 ) -> tuple[float, float, float]:
-    """Return how well a pose explains the shots, and how much of the model is hidden, as shares in [0, 1].
-
-    They are the measured points (P, 3) on the model (Q, 3); the visible surface that was measured where it should be;
-    and the surface facing the camera that is behind something measured.
-    """
-    placed_m = transform(T_world_object, model_m)
-    facing_out = rotate(T_world_object, normals)
+    """Return the shares of measured points (P, 3) on the model (Q, 3), of its visible surface that was measured where
+    it should be, and of its surface facing the camera that is behind something measured."""
+    placed_m, facing_out = transform(T_world_object, model_m), rotate(T_world_object, normals)
     reach_m = NEAR * diameter_m
     on_model = np.mean(cKDTree(placed_m).query(points_m, distance_upper_bound=reach_m)[0] < reach_m)
     explained = visible = hidden = 0
     for shot in shots:
         v, u, depth_m = shot.project(placed_m)
         facing = np.sum(facing_out * (placed_m - shot.T_world_camera[:3, 3]), axis=1) < 0
-        measured_m = shot.depth_m[v, u]
-        mine = shot.mask[v, u]
+        measured_m, mine = shot.depth_m[v, u], shot.mask[v, u]
         compared = facing & (v >= 0) & (measured_m > 0)
         seen = compared & (mine | (measured_m > depth_m - reach_m))
         visible += seen.sum()

@@ -64,9 +64,7 @@ class Shelf:
     def estimator(self, model: int) -> GlobalRegistration:
         """Return the pose estimator of an object."""
         if model not in self._estimators:
-            points_m, normals = self.objects.points(model), self.objects.normals_of(model)
-            diameter_m = float(self.objects.diameters_m[model])
-            self._estimators[model] = GlobalRegistration(points_m, normals, diameter_m, self._settings)
+            self._estimators[model] = GlobalRegistration(self.objects, model, self._settings)
         return self._estimators[model]
 
 
@@ -102,9 +100,8 @@ class Situation:
     @cached_property
     def meshes(self) -> MeshScene:
         """The scene, ready to be looked at; mesh 0 is the object."""
-        surfaces = self.shelf.surfaces
-        placed = [(transform(p.T_world_object, surfaces[p.model].vertices_m), p.model) for p in self.standing]
-        return MeshScene([*((vertices_m, surfaces[model].triangles) for vertices_m, model in placed), table()])
+        placed = [(p.T_world_object, self.shelf.surfaces[p.model]) for p in self.standing]
+        return MeshScene([*((transform(T, surface.vertices_m), surface.triangles) for T, surface in placed), table()])
 
     def shoot(self, T_world_camera: np.ndarray, frames: int, *axes: object) -> Shot:
         """Measure from a viewpoint: the median depth of several frames, whose noise is named by the axes."""
@@ -200,9 +197,8 @@ class Situations:
         """Stand another object on the table, toward the camera and as near to the object as there is room."""
         from shapely.affinity import translate
 
-        taken = [object_.model for object_ in clean.standing]
-        free = [model for model in range(len(self._shelf.surfaces)) if model not in taken]
-        if not free:
+        taken = {object_.model for object_ in clean.standing}
+        if not (free := sorted(set(range(len(self._shelf.surfaces))) - taken)):
             return None
         model = int(random.choice(free))
         T_world_object = rest(*self._shelf.resting[model], random)

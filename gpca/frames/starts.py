@@ -1,10 +1,4 @@
-"""Starts: initial poses of the registrations of instances, by where the poses come from.
-
-- native: found by an estimator in the same image; the pose of every estimator is a start;
-- carried: found in a neighboring image and carried over by its error;
-- transplanted: the truth with an error that an estimator made elsewhere, where none found the instance;
-- ladder: the truth with an error of a fixed size in a random direction, one start for each rung.
-"""
+"""Starts: initial poses of the registrations of instances, by where the poses come from (docs/causes.md)."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -46,12 +40,11 @@ def all_starts(
 ) -> Starts:
     """Return every start of every instance, by kind; `rungs` are turns in degrees and shifts in diameters."""
     numbers = {
-        (name, objects.row(model.surface.name)): number
+        (name, objects.row(model.surface.name)): (name, number)
         for name, by_id in models.items()
         for number, model in by_id.items()
     }
-    shown = zip(instances.dataset.tolist(), instances.object_index.tolist(), strict=True)
-    object_I = [(name, numbers[name, index]) for name, index in shown]
+    object_I = [numbers[of] for of in zip(instances.dataset.tolist(), instances.object_index.tolist(), strict=True)]
     errors = EstimatorErrors.read(
         {name: (dataset.errors, models[name]) for name, dataset in datasets.items()},
         {key for key, symmetric in zip(object_I, instances.symmetric, strict=True) if symmetric},
@@ -94,10 +87,8 @@ def all_starts(
             T_init = instances.T_camera_object_true[i] @ scale_translation(T_error, diameter_m)
             starts.append((i, LADDER, f"{turn_deg:g} deg, {shift:g} d", T_init))
     starts.sort(key=lambda start: (KINDS.index(start[1]), start[0]))
-    instance_K, kind_K, from_K, T_K = zip(*starts, strict=True) if starts else ((), (), (), ())
-    return Starts(
-        np.array(instance_K, int), np.array(kind_K, str), np.array(from_K, str), np.array(T_K, float).reshape(-1, 4, 4)
-    )
+    instance_K, kind_K, from_K, T_K = (np.array([start[part] for start in starts]) for part in range(4))
+    return Starts(instance_K.astype(int), kind_K.astype(str), from_K.astype(str), T_K.reshape(-1, 4, 4))
 
 
 def _axes(instances: Instances, i: int) -> tuple:

@@ -20,8 +20,7 @@ from gpca.seeds import generator
 from gpca.settings import OpenShare, Share
 
 OCCLUDER, HALF_SPACE = "occluder", "half_space"
-STEP_PX = 2
-TOLERANCE = 0.03
+STEP_PX, TOLERANCE = 2, 0.03
 
 
 @dataclass(frozen=True)
@@ -38,8 +37,7 @@ def make_frame_registrations(
 ) -> tuple[Registrations, np.ndarray, Frame]:
     """Return aligned pairs of instances, perturbed about their initial poses, the seconds (S,) of ICP, a row for each.
 
-    Samples 3t, 3t + 1 and 3t + 2 of a split show one instance under the three concepts in random order; instances take
-    turns. The source frame is the object's at the initial pose. Errors are ADD-S or ADD relative to the diameter.
+    Samples 3t, 3t + 1 and 3t + 2 of a split show one instance under the three concepts; instances take turns.
     """
     import pandas as pd
 
@@ -55,10 +53,9 @@ def make_frame_registrations(
         concept = str(generator(source, seed, "concepts", split, deal).permutation(CONCEPTS)[place])
         random = generator(source, seed, "registration", split, n)
         record, lost_to = _register_one(instances, i, objects, concept, settings, random)
-        record |= {"sample": n, "split": split, "concept": concept}
-        record |= {"cluster": str(cluster_I[i]), "fold": int(instances.fold[i])}
-        records.append(record)
-        pose_row: dict[str, Any] = {"sample": n, "split": split, "concept": concept, "instance": i}
+        sample = {"sample": n, "split": split, "concept": concept}
+        records.append(record | sample | {"cluster": str(cluster_I[i]), "fold": int(instances.fold[i])})
+        pose_row: dict[str, Any] = {**sample, "instance": i}
         pose_row |= {name: getattr(instances, name)[i] for name in ("dataset", "scene", "image")}
         pose_row |= {"object": record["object_name"], "in_training": record["object_index"] in trained}
         pose_row |= {"symmetric": bool(instances.symmetric[i]), "init_from": instances.init_from[i]}
@@ -75,9 +72,8 @@ def make_frame_registrations(
 def _register_one(
     instances: Instances, i: int, objects: ObjectClouds, concept: str, settings: FrameSettings, random
 ) -> tuple[dict, str]:
-    index = int(instances.object_index[i])
+    index, registration = int(instances.object_index[i]), settings.registration
     diameter_m = float(objects.diameters_m[index])
-    registration = settings.registration
     rows = random.permutation(len(instances.cloud_m(i)))[: registration.cloud_points]
     target_rows = random.permutation(len(objects.points(index)))[: registration.cloud_points]
     T_init_camera = inverse(instances.T_camera_object_init[i])
@@ -93,7 +89,6 @@ def _register_one(
     T_object_init = inverse(instances.T_camera_object_true[i]) @ instances.T_camera_object_init[i]
     T_true = scale_translation(T_object_init, 1 / diameter_m) @ perturbed.T_target_source_true
     perturbed = replace(perturbed, T_target_source_true=T_true)
-
     return align_pair(perturbed, objects, index, target_rows, registration.icp), lost_to
 
 

@@ -1,7 +1,4 @@
-"""Object models in the layout of the BOP benchmark: models/obj_000001.ply and models_info.json, in millimeters.
-
-Format: https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_format.md.
-"""
+"""Object models in the layout of the BOP benchmark: models/obj_000001.ply and models_info.json, in millimeters."""
 
 import math
 import re
@@ -148,33 +145,28 @@ def find_symmetries(
         turned = Rotation.from_rotvec(np.deg2rad(angle_deg) * axis).apply(points_N_3)
         return (distances(turned) if distances else tree.query(turned)[0]).mean() < limit
 
-    continuous, discrete = [], []
+    symmetries: dict[str, list] = {"symmetries_discrete": [], "symmetries_continuous": []}
     for axis in np.eye(3):
         if all(fits(axis, angle) for angle in CONTINUOUS_DEG):
-            continuous.append({"axis": axis.tolist(), "offset": [0.0, 0.0, 0.0]})
+            symmetries["symmetries_continuous"].append({"axis": axis.tolist(), "offset": [0.0, 0.0, 0.0]})
             continue
         for angle in DISCRETE_DEG:
             if fits(axis, angle):
                 R = Rotation.from_rotvec(np.deg2rad(angle) * axis).as_matrix()
-                discrete.append(rigid_motion(R).round(9).ravel().tolist())
-    symmetries: dict[str, list] = {"symmetries_discrete": discrete, "symmetries_continuous": continuous}
+                symmetries["symmetries_discrete"].append(rigid_motion(R).round(9).ravel().tolist())
     return {key: entries for key, entries in symmetries.items() if entries}
 
 
 def angle_up_to_symmetry(R_3_3: np.ndarray, symmetries: Mapping[str, list]) -> float:
-    """Return the smallest angle, in radians, of a rotation combined with a symmetry from :func:`find_symmetries`.
-
-    For a single axis of revolution a and the unit quaternion (w, v) of the rotation, the cosine of half the smallest
-    angle is √(w² + (v·a)²). With two axes of revolution, every rotation is a symmetry.
-    """
+    """Return the smallest angle, in radians, of a rotation combined with a symmetry from :func:`find_symmetries`."""
     from scipy.spatial.transform import Rotation
 
     axes = [entry["axis"] for entry in symmetries.get("symmetries_continuous", [])]
-    if len(axes) > 1:
+    if len(axes) > 1:  # every rotation is a symmetry
         return 0.0
     quaternions_K_4 = Rotation.from_matrix(R_3_3 @ _generated(symmetries)).as_quat()
     cosine_squared_K = quaternions_K_4[:, 3] ** 2
-    for axis in axes:
+    for axis in axes:  # cos² of half the smallest angle of a quaternion (w, v) about it is w² + (v·a)²
         cosine_squared_K += (quaternions_K_4[:, :3] @ np.asarray(axis)) ** 2
     return float(2 * np.arccos(np.sqrt(min(1.0, cosine_squared_K.max()))))
 

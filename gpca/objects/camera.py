@@ -105,11 +105,6 @@ def planes(corners_F_3_3: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 class DepthNoise:
     """Noise of a structured-light depth camera, by Nguyen, Izadi and Lovell (3DIMPVT 2012).
 
-    With the distance z in meters and the angle θ between surface and line of sight:
-
-        axial deviation  σ_z = 0.0012 + 0.0019 (z - 0.4)²  meters, and beyond 60° more: + 0.0001 θ² / (√z (π/2 - θ)²),
-        lateral deviation  σ_L = 0.8 + 0.035 θ / (π/2 - θ)  pixels.
-
     Lateral noise shifts the pixel that is looked at, so that edges fray.
     """
 
@@ -119,6 +114,7 @@ class DepthNoise:
 
     def measure(self, view: View, random: np.random.Generator) -> np.ndarray:
         """Return measured depth (H, W) in meters, 0 where nothing was measured."""
+        # The angle between surface and line of sight.
         theta = np.minimum(np.arccos(np.clip(view.cosine, 0, 1)), np.deg2rad(89))
         height, width = view.depth_m.shape
         lateral_px = self.scale * (0.8 + 0.035 * theta / (np.pi / 2 - theta))

@@ -1,8 +1,4 @@
-"""Surfaces into canonical clouds: sampled uniformly, centered on the bounding box, measured by diameter, checked.
-
-A family of shapes, or a scene, is a *cluster*, never split between training and test. Clusters are dealt into *folds*
-(data/README.md); each seed leaves one fold unseen.
-"""
+"""Surfaces into canonical clouds, and the folds of their clusters (families or scenes), one of which is unseen."""
 
 from __future__ import annotations
 
@@ -22,6 +18,7 @@ from gpca.io.files import is_name
 from gpca.objects.sizes import LARGEST_DIAMETER_M, SMALLEST_DIAMETER_M, require_size
 from gpca.objects.surface import Surface, instance_of, meters_per
 from gpca.process.environment import open3d_cloud, require_open3d
+from gpca.rigid import rigid_motion
 from gpca.seeds import generator
 
 FEWEST_CLOUD_POINTS = 64
@@ -78,8 +75,7 @@ def diameter(points: np.ndarray, subject: object) -> float:
 def canonical_cloud(surface: Surface, source: str, n_points: int = 16384) -> tuple[np.ndarray, np.ndarray, float]:
     """Return points and unit normals (P, 3) float32 of a surface, centered on its bounding box, and its diameter (m).
 
-    A mesh gives `n_points` area-uniform samples. A cloud keeps all its points, in random order; missing normals are
-    estimated and turned toward the camera at the origin.
+    A mesh gives `n_points` area-uniform samples; a cloud keeps all its points, in random order.
     """
     subject = f"{source}: object '{surface.name}'"
     vertices_m = np.asarray(surface.vertices_m, dtype=np.float64)
@@ -120,8 +116,7 @@ def sample_surface(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Draw points (P, 3) uniformly from the area of a mesh, and return the face of each; trimesh draws the same."""
     a_F_3, b_F_3, c_F_3 = (vertices_m[faces[:, corner]] for corner in range(3))
-    area_F = np.sqrt((np.cross(b_F_3 - a_F_3, c_F_3 - b_F_3) ** 2).sum(axis=1)) / 2
-    sum_F = np.cumsum(area_F)
+    sum_F = np.cumsum(np.sqrt((np.cross(b_F_3 - a_F_3, c_F_3 - b_F_3) ** 2).sum(axis=1)) / 2)
     face_P = np.searchsorted(sum_F, random.random(n_points) * sum_F[-1])
     along_P_2_1 = random.random((n_points, 2, 1))
     along_P_2_1[along_P_2_1.sum(axis=1)[:, 0] > 1.0] -= 1.0  # the other half of the parallelogram
@@ -165,15 +160,13 @@ class CanonicalFrame:
 
     def pose_inside(self, T_b_a: np.ndarray) -> np.ndarray:
         """Return a motion (4, 4) of the original frame and unit in this frame."""
-        inside = T_b_a.copy()
-        inside[:3, 3] = (T_b_a[:3, 3] + T_b_a[:3, :3] @ self.center_3 - self.center_3) / self.diameter
-        return inside
+        R = T_b_a[:3, :3]
+        return rigid_motion(R, (T_b_a[:3, 3] + R @ self.center_3 - self.center_3) / self.diameter)
 
     def pose_outside(self, T_b_a: np.ndarray) -> np.ndarray:
         """Return a motion (4, 4) of this frame in the original frame and unit."""
-        outside = T_b_a.copy()
-        outside[:3, 3] = self.diameter * T_b_a[:3, 3] + self.center_3 - T_b_a[:3, :3] @ self.center_3
-        return outside
+        R = T_b_a[:3, :3]
+        return rigid_motion(R, self.diameter * T_b_a[:3, 3] + self.center_3 - R @ self.center_3)
 
 
 def require_cloud_points(points: np.ndarray, subject: object) -> None:
@@ -194,7 +187,9 @@ def write_objects(
     surfaces: Iterable[Surface], source: str, path: str | Path, n_points: int = 16384, splits: Path | None = None
 ) -> None:
     """Write the canonical clouds of a source, whole or not at all; `splits` is a file of families and folds."""
-    places = read_object_splits(splits, source) if splits else {}
+    if not (places := read_object_splits(splits, source) if splits else {}):
+        sample_objects(surfaces, source, n_points).save(path, source)
+        return
 
     def is_used(surface: Surface) -> bool:
         if surface.name not in places:
@@ -202,11 +197,9 @@ def write_objects(
             raise InputError(f"object '{surface.name}'", "is in no split", remedy)
         return places[surface.name].role != UNUSED
 
-    objects = sample_objects(filter(is_used, surfaces) if places else surfaces, source, n_points)
-    if places:
-        families, folds = zip(*((places[name].cluster, places[name].fold) for name in objects.names), strict=True)
-        objects = replace(objects, families=np.array(families), folds=np.array(folds))
-    objects.save(path, source)
+    objects = sample_objects(filter(is_used, surfaces), source, n_points)
+    families, folds = zip(*((places[name].cluster, places[name].fold) for name in objects.names), strict=True)
+    replace(objects, families=np.array(families), folds=np.array(folds)).save(path, source)
 
 
 def sample_objects(surfaces: Iterable[Surface], source: str, n_points: int = 16384) -> ObjectClouds:

@@ -1,8 +1,4 @@
-"""Readers of PLY, OBJ, STL and OFF. A file must hold what it declares.
-
-Rows that are too wide, lists of another length, misspelled keywords and an early end are faults. trimesh would take
-longer to import than an explanation takes.
-"""
+"""Readers of PLY, OBJ, STL and OFF that hold what they declare; trimesh would take too long to import."""
 
 import os
 import re
@@ -78,9 +74,9 @@ def _read_ply(file: IO[bytes]) -> Shape:
     if not set(AXES) <= set(vertex):
         raise ValueError("its vertices lack x, y or z")
     vertices = np.stack([vertex[axis] for axis in AXES], axis=1, dtype=np.float64)
-    has_normals = set(NORMALS) <= set(vertex)
-    normals = np.stack([vertex[axis] for axis in NORMALS], axis=1, dtype=np.float64) if has_normals else None
-    faces = np.zeros((0, 3), np.int64)
+    normals, faces = None, np.zeros((0, 3), np.int64)
+    if set(NORMALS) <= set(vertex):
+        normals = np.stack([vertex[axis] for axis in NORMALS], axis=1, dtype=np.float64)
     for element in elements:
         if element.name == "face":
             if element.corners is None:
@@ -92,8 +88,7 @@ def _read_ply(file: IO[bytes]) -> Shape:
 def _ply_header(file: IO[bytes]) -> tuple[str, list[_Element]]:
     """Return the order of bytes, none for text, and the elements that have rows."""
     elements: dict[str, _Element] = {}
-    form = b""
-    lines = bounded_lines(file)
+    form, lines = b"", bounded_lines(file)
     if next(lines, b"").strip() != b"ply":
         raise ValueError("it does not begin with 'ply'")
     properties: list[_Property] | None = None

@@ -1,7 +1,4 @@
-"""Point clouds in files: PCD (0.6, 0.7), NumPy's, text, and bin of scanners; rows without a measurement are kept.
-
-As a kind of source, views of the UW RGB-D Object Dataset: PCD named <class>_<instance>_<sequence>_<frame>, in meters.
-"""
+"""Point clouds in files: PCD (0.6, 0.7), NumPy's, text, and bin of scanners; rows without a measurement are kept."""
 
 import io
 import re
@@ -61,25 +58,23 @@ def _parse_pcd(content: bytes) -> np.ndarray:
     width, height, count = (whole(values[key][0], most=10**18) for key in ("WIDTH", "HEIGHT", "POINTS"))
     if width * height != count:
         raise ValueError("wrong header: POINTS is not WIDTH times HEIGHT")
-    # Fields are named by their position, since PCD repeats the name "_".
     lengths = [whole(length) for length in counts]
     columns = [np.dtype((f"<{scalar}", (length,))) for scalar, length in zip(scalars, lengths, strict=True)]
-    dtype = np.dtype([(str(i), column) for i, column in enumerate(columns)])
+    dtype = np.dtype([(str(i), column) for i, column in enumerate(columns)])  # PCD repeats the name "_"
     body, xyz, size = content[position:], [fields.index(axis) for axis in AXES], count * dtype.itemsize
     match " ".join(values["DATA"]):
         case "ascii":
             starts = np.cumsum([0, *lengths])
-            table = np.zeros((0, starts[-1]))
-            if count:
-                table = np.loadtxt(io.BytesIO(body), dtype=np.float64, ndmin=2, comments=None)
+            rows = io.BytesIO(body)
+            table = np.loadtxt(rows, ndmin=2, comments=None) if count else np.zeros((0, starts[-1]))
             if table.shape != (count, starts[-1]):
                 raise ValueError(f"the header states {count}×{starts[-1]} values, but the file has {table.shape}")
             points = table[:, starts[xyz]]
         case "binary":
             if len(body) != size:
                 raise ValueError(f"the header states {size} bytes of data, but the file has {len(body)}")
-            rows = np.frombuffer(body, dtype)
-            points = np.column_stack([rows[str(i)][:, 0] for i in xyz])
+            records = np.frombuffer(body, dtype)
+            points = np.column_stack([records[str(i)][:, 0] for i in xyz])
         case "binary_compressed":
             packed, unpacked = struct.unpack_from("<II", body)
             if len(body) < 8 + packed:
@@ -172,8 +167,7 @@ def _text(path: Path) -> np.ndarray:
     separator = next((sign for sign in SEPARATORS if sign in lines[0]), None)
     words = [word.strip().strip('"').lower() for word in lines[0].split(separator)]
     columns: tuple[int, ...] = (0, 1, 2)
-    names_columns = not any(map(_is_number, words))
-    if names_columns:
+    if names_columns := not any(map(_is_number, words)):
         if not set(AXES) <= set(words):
             raise InputError(path, f"has the columns {', '.join(words[:8])}, not x, y, z", COLUMNS_REMEDY)
         columns = tuple(map(words.index, AXES))

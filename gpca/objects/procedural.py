@@ -1,7 +1,4 @@
-"""Stand-ins made by the package: a few solids in millimeters, z up, stretched to the extents of what they stand for.
-
-Extents are those of BOP's models_info.json for LINEMOD (x to the front), and of the google_16k scans for YCB.
-"""
+"""Stand-ins made by the package: a few solids in millimeters, z up, stretched to the extents that data sets list."""
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
@@ -87,10 +84,8 @@ def revolved(profile_rz: Sequence[Point]) -> Manifold:
 
 def tube(path: Sequence[Point], radii: float | Sequence[float]) -> Manifold:
     """Return a chain of capsules through the points (K, 3) of a path, of one radius or one for each point."""
-    balls = [
-        Manifold.sphere(radius, TUBE_SEGMENTS).translate(at)
-        for at, radius in zip(path, np.broadcast_to(radii, len(path)), strict=True)
-    ]
+    balls_at = zip(path, np.broadcast_to(radii, len(path)), strict=True)
+    balls = [Manifold.sphere(radius, TUBE_SEGMENTS).translate(at) for at, radius in balls_at]
     return union(*(hull(*ends) for ends in pairwise(balls)))
 
 

@@ -62,8 +62,6 @@ def in_unit(points: np.ndarray, own_unit: str | None, unit: str) -> np.ndarray:
 
 
 REMEDY = "give an (N, 3) array or a point cloud of Open3D"
-
-
 FEWEST_ZEROS = 2  # rows (0, 0, 0) that are no points; a single one may be
 
 

@@ -137,10 +137,8 @@ def describe_points(pair: ObservedPair, matched: MatchedPair, points: int) -> np
     Coordinates (diameters); logarithms of the distances from the nearest point of the other cloud and from its plane,
     and of the own thickness relative to its; |cosine| between the normals. Clouds of fewer points repeat some.
     """
-    spacing = float(np.median(matched.model.spacing))
-    usual_thickness = float(np.median(matched.model.thickness))
     observed, model = matched.observed, matched.model
-
+    spacing, usual_thickness = float(np.median(model.spacing)), float(np.median(model.thickness))
     log_ratio = partial(log_of_ratio, spacing=spacing)
     sides = []
     for cloud, own, other, partner, distance, from_plane in (
@@ -162,17 +160,13 @@ def log_of_ratio(lengths: np.ndarray, to: np.ndarray | float, spacing: float) ->
 def describe_entropy(pair: ObservedPair) -> np.ndarray:
     """Return `ENTROPY` by radius: mean nats joint, apart, their difference; the share with enough neighbors."""
     joint = np.concatenate([pair.observed, pair.model])
-    described: list[float] = []
-    for radius in RADII:
+    described = np.zeros((len(RADII), 4))
+    for row, radius in enumerate(RADII):
         own_N = np.concatenate([_entropies(cloud, radius) for cloud in (pair.observed, pair.model)])
-        joint_N = _entropies(joint, radius)
-        measured_N = np.isfinite(own_N)
-        if not measured_N.any():
-            described += [0.0, 0.0, 0.0, 0.0]
-            continue
-        means = joint_N[measured_N].mean(), own_N[measured_N].mean()
-        described += [*means, means[0] - means[1], measured_N.mean()]
-    return np.array(described)
+        if (measured_N := np.isfinite(own_N)).any():
+            means = _entropies(joint, radius)[measured_N].mean(), own_N[measured_N].mean()
+            described[row] = *means, means[0] - means[1], measured_N.mean()
+    return described.ravel()
 
 
 def _entropies(points: np.ndarray, radius: float) -> np.ndarray:
@@ -185,11 +179,8 @@ def _entropies(points: np.ndarray, radius: float) -> np.ndarray:
     moments_N_3_3 = np.empty((len(points), 3, 3))
     for i, j in np.ndindex(3, 3):
         moments_N_3_3[:, i, j] = np.bincount(rows, offset_P_3[:, i] * offset_P_3[:, j], len(points)) / count_N
-    enough_N = count_N >= FEWEST_NEIGHBORS
-    entropy_N = np.full(len(points), np.nan)
-    determinants = np.linalg.slogdet(2 * np.pi * np.e * (moments_N_3_3[enough_N] + ENTROPY_FLOOR * np.eye(3)))[1]
-    entropy_N[enough_N] = 0.5 * determinants
-    return entropy_N
+    log_determinant_N = np.linalg.slogdet(2 * np.pi * np.e * (moments_N_3_3 + ENTROPY_FLOOR * np.eye(3)))[1]
+    return np.where(count_N >= FEWEST_NEIGHBORS, 0.5 * log_determinant_N, np.nan)
 
 
 QUANTILES = len(LEVELS)
@@ -220,28 +211,14 @@ def describe_registrations(registrations: Registrations, *axes: object, points: 
 
 
 def relations(pair: ObservedPair, distances: np.ndarray, planes: np.ndarray) -> np.ndarray:
-    """Return 35 numbers that compare the clouds with the model's own spacing and thickness, alike for all objects.
-
-    Logarithms of quantiles of distances and thickness; |cosine| between normals; the motion: angle (radians), length
-    and displacement (diameters), fitness, and the inlier RMSE relative to the spacing.
-    """
+    """Return 35 numbers that compare the clouds with the model's own spacing and thickness, alike for all objects."""
     to_model, to_observed, from_plane, thickness = distances.reshape(4, QUANTILES)[:, COARSE]
     from_observed_plane, cosine, model_thickness = planes[: 3 * QUANTILES].reshape(3, QUANTILES)[:, COARSE]
     spacing, usual_thickness = planes[3 * QUANTILES + 1], np.median(model_thickness)
-
     log_ratio = partial(log_of_ratio, spacing=spacing)
-    moved = log(inverse(pair.T_init)[None])[0]
-    return np.concatenate(
-        [
-            log_ratio(to_model, spacing),
-            log_ratio(to_observed, spacing),
-            log_ratio(from_plane, usual_thickness),
-            log_ratio(thickness, model_thickness),
-            log_ratio(from_observed_plane, usual_thickness),
-            cosine,
-            [np.sqrt(np.square(moved[:3]).sum()), np.sqrt(np.square(moved[3:]).sum())],
-            displacements(pair.T_init[None], pair.observed),
-            pair.fitness_n,
-            log_ratio(pair.inlier_rmse_n, spacing),
-        ]
-    )
+    planar = [log_ratio(from_plane, usual_thickness), log_ratio(thickness, model_thickness)]
+    planar += [log_ratio(from_observed_plane, usual_thickness), cosine]
+    moved_2 = np.sqrt(np.square(log(inverse(pair.T_init)[None])[0]).reshape(2, 3).sum(axis=1))
+    motion = [moved_2, displacements(pair.T_init[None], pair.observed)]
+    motion += [pair.fitness_n, log_ratio(pair.inlier_rmse_n, spacing)]
+    return np.concatenate([log_ratio(to_model, spacing), log_ratio(to_observed, spacing), *planar, *motion])

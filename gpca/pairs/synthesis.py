@@ -121,10 +121,9 @@ def registered_backwards(registrations: Registrations, settings: ICPSettings) ->
     """Return the pairs, with the observed cloud moved by the inverse of what ICP finds from the model to it."""
     clouds, targets, poses, fits = [], [], [], []
     for row in range(len(registrations)):
-        target = registrations.target(row).astype(np.float64)
-        T_init = registrations.T_target_source("init", row)
-        observed = registrations.source(row)
+        observed, T_init = registrations.source(row), registrations.T_target_source("init", row)
         normals = None if settings.method == "point_to_point" else estimate_normals(observed)
+        target = registrations.target(row).astype(np.float64)
         backwards = ICP(observed, normals, settings).register(target, inverse(T_init))
         T_target_source = inverse(backwards.T_target_source)  # ICP's target was the source
         clouds.append(transform(T_target_source, observed).astype(np.float32))

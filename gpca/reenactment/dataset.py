@@ -29,12 +29,8 @@ from gpca.rigid import inverses, transform
 
 
 def verdict(error_S_K_8: np.ndarray, weight_S_K: np.ndarray, limits: Limits) -> np.ndarray:
-    """Return the probabilities (S, 4) of nominal and of each cause to be the dominant one, of S pairs.
-
-    Under each of K hypotheses a failure is as probable as not where v̂(all) is midway between the limits, and P(cause)
-    is the softmax of φ̂ at the limit of a cause as temperature.
-    """
-    middle = np.sqrt(limits.nominal * limits.failed)
+    """Return the probabilities (S, 4) of nominal and of each cause to be the dominant one, of S pairs."""
+    middle = np.sqrt(limits.nominal * limits.failed)  # where a failure is as probable as not
     failed_S_K = expit(STEEPNESS * np.log(np.maximum(error_S_K_8[..., ALL], SMALLEST_ERROR) / middle))
     phi_S_K_3 = shapley_values(error_S_K_8.reshape(-1, ALL + 1)).reshape(*weight_S_K.shape, -1)
     share_S_K_3 = np.exp((phi_S_K_3 - phi_S_K_3.max(axis=2, keepdims=True)) / limits.cause)
@@ -56,8 +52,7 @@ World = Callable[[ObservedPair, int], list[Enactment]]
 class Reenactments(Container):
     """The re-enactments of S registrations under K hypotheses each, the most probable first.
 
-    Where a pair has fewer hypotheses, its first stands in the place of the others, with weight 0. Poses are those of
-    :class:`gpca.reenactment.hypotheses.Hypothesis`, in diameters; errors and uncertainties are v̂ and û. The last of
+    Where a pair has fewer hypotheses, its first stands in the place of the others, with weight 0. The last of
     `MEASURED` are how far (root mean square) the observed points lie from where the registration began and ended.
     """
 
@@ -78,11 +73,10 @@ class Reenactments(Container):
     ) -> Reenactments:
         """Return those of the rows of pairs (:func:`row_of`), which may be of no registrations of a file."""
         arrays: dict[str, Any] = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-        verdict_S_4 = verdict(arrays["error"], arrays["weight"], truth.limits)
-        sample, split, axes = np.arange(len(rows)), np.full(len(rows), ""), None
-        if registrations is not None:
-            sample, split, axes = registrations.sample, registrations.split, registrations.axes
-        return cls(sample=sample, split=split, **arrays, verdict=verdict_S_4, axes=axes)
+        arrays |= {"verdict": verdict(arrays["error"], arrays["weight"], truth.limits)}
+        if registrations is None:
+            return cls(sample=np.arange(len(rows)), split=np.full(len(rows), ""), **arrays)
+        return cls(sample=registrations.sample, split=registrations.split, **arrays, axes=registrations.axes)
 
 
 def reenact_all(

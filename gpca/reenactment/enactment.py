@@ -26,14 +26,10 @@ QUIET = 0.004  # diameters; noise that is no larger is none
 
 
 class NoiseScale:
-    """Tells noise from the distances of points to a model's planes, by noise that is simulated on the model itself.
-
-    The nearest point of a noisy one is often not where it came from, so distances grow more slowly than the noise.
-    """
+    """Tells noise from the distances of points to a model's planes, by noise that is simulated on the model itself."""
 
     def __init__(self, surface: ModelSurface, random: np.random.Generator) -> None:
-        repeats = max(1, -(-SIMULATED // len(surface.points)))
-        points = np.tile(surface.points, (repeats, 1))
+        points = np.tile(surface.points, (max(1, -(-SIMULATED // len(surface.points))), 1))
         unit = random.normal(size=points.shape)
         squares = [trimmed_square(surface.residuals(points + noise * unit)[0]) for noise in NOISES]
         roots = np.sqrt(np.array(squares) + surface.roughness)
@@ -97,8 +93,7 @@ BESIDE = 0.6  # of the spacing: so far from a model's point, in its plane, a fre
 def rebuild(T: np.ndarray, observation: Observation, surface: ModelSurface, random: np.random.Generator) -> Candidate:
     """Return the pair as a candidate of the truth: what was observed is its noisy cloud, of which a part is kept.
 
-    Noise is taken away by moving each point to its plane, as far as it exceeds the roughness of the planes; outliers
-    and missing surface become fresh points, surface that the model lacks the points observed there.
+    Points move to their planes; outliers and missing surface become fresh points.
     """
     noise, missing = observation.noise, float(1 - observation.covered.mean())  # of the model
     quiet = noise <= QUIET and observation.outliers < FEW_OUTLIERS

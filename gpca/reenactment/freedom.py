@@ -1,8 +1,6 @@
 """Directions in which a pose is free: moved along one of them, what was observed fits the model as well.
 
-A twist u moves a point by J u, and off the plane with the normal n by nᵀJ u. The six directions are the eigenvectors of
-the mean square of the latter relative to the former, each factor with normals from other points: an error of them would
-hold any direction. How firmly one is held is how much likelihood the pose loses at some distance along it.
+Twists u are the eigenvectors of the mean of (nᵀJ u)(mᵀJ u) relative to |J u|², with normals n and m from other points.
 """
 
 from dataclasses import dataclass

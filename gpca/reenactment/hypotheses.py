@@ -1,7 +1,4 @@
-"""Hypotheses of the true pose, by ICP from starts all over the rotations and then the mixture, and their probabilities.
-
-Poses take what was observed, where it lay before the registration, to the model: the identity is the initial pose.
-"""
+"""Hypotheses of the true pose and their probabilities: ICP from starts all over the rotations, then the mixture."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -90,12 +87,8 @@ def find_hypotheses(
     few, few_model = observed[np.sort(random.permutation(len(observed))[:FITTED])], surface.points[:FITTED_MODEL]
     few_spacing = surface.spacing * np.sqrt(len(surface.points) / len(few_model))
     some = few, Mixture(few_model, few_spacing / 2), ITERATIONS, densities_of(few, few_model)
-    every = (
-        observed,
-        Mixture(surface.points, surface.spacing / 2),
-        LAST_ITERATIONS,
-        densities_of(observed, surface.points),
-    )
+    mixture, densities = Mixture(surface.points, surface.spacing / 2), densities_of(observed, surface.points)
+    every = observed, mixture, LAST_ITERATIONS, densities
 
     def fit(fitted: tuple[np.ndarray, Mixture, int, np.ndarray], T_n: np.ndarray, **options: Any) -> list[Hypothesis]:
         points, mixture, iterations, densities = fitted
@@ -176,14 +169,10 @@ def search_ends(
 
 
 def log_prior(T: np.ndarray, settings: ReenactmentSettings) -> float:
-    """Return the logarithm of how probable a pose error is beforehand, up to a constant.
-
-    Weights are those of good, bad and lost starts, not densities: a hypothesis stands for all poses around it.
-    """
+    """Return the logarithm of how probable a pose error is beforehand, up to a constant."""
     angle, length = rotation_angle_rad(T), float(np.sqrt(np.square(T[:3, 3]).sum()))
 
-    def log_normal(rotation_deg: float, translation: float) -> float:
-        # A root mean square over three axes.
+    def log_normal(rotation_deg: float, translation: float) -> float:  # root mean squares over three axes
         return -1.5 * ((angle / np.deg2rad(rotation_deg)) ** 2 + (length / translation) ** 2)
 
     good = np.log(settings.good_starts) + log_normal(settings.good_rotation_deg, settings.good_translation)

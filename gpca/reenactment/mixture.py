@@ -1,8 +1,4 @@
-"""The likelihood of a pose: observed points are normal around the model's points, or outliers spread over a cube.
-
-Width and share of outliers are estimated for each pose. Expectation maximization draws each point to the mean of its
-partners, weighted by how probable they are (Granger & Pennec 2002; Myronenko & Song 2010).
-"""
+"""The likelihood of a pose: points are normal around the model's, or outliers (Granger & Pennec 2002)."""
 
 from dataclasses import dataclass
 

@@ -1,8 +1,4 @@
-"""Which part of a surface was observed: before a plane, what one side sees, or all but some patches.
-
-A region of a share s of the surface is 1/s times as likely as the whole for each observed point inside, and hardly for
-any outside; noise and gaps between points blur which are.
-"""
+"""Which part of a surface was observed: before a plane, what one side sees, or all but some patches."""
 
 from __future__ import annotations
 
@@ -51,6 +47,7 @@ class Regions:
 
         def best_of(regions: np.ndarray) -> tuple[float, np.ndarray]:
             """Return by how many nats the likeliest of some regions (m, R) explains more than the whole, and which."""
+            # A region of a share s is 1/s times as likely for each observed point inside, and hardly for any outside.
             share_R = np.maximum(regions.mean(axis=0), LEAST_LEFT)
             inside_N_R = weight_N_m @ regions.astype(float)
             nats_R = np.log((1 - OUTSIDE) * inside_N_R / share_R + OUTSIDE).sum(axis=0)

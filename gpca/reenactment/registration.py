@@ -56,15 +56,10 @@ def pose_posterior(
     onto_center = rigid_motion(np.eye(3), pair.target.mean(axis=0) - pair.source.mean(axis=0))
     frame = Frame(pair, pair.T_target_source_init if prior else onto_center, unit)
     random = generator("registration", "posterior", pair.seed)
-    given = (frame.source, ModelSurface(frame.target))
-    if prior:
-        hypotheses = find_hypotheses(*given, np.empty((0, 4, 4)), settings, random)
-    else:
-        R_n = rotations(TURNS, 180.0)
-        about_center_n = rigid_motion(R_n, np.zeros((len(R_n), 3)))
-        hypotheses = find_hypotheses(
-            *given, about_center_n, settings, random, lambda T, _width: -log_prior(T, settings)
-        )
+    found_n, evidence = np.empty((0, 4, 4)), None
+    if not prior:
+        found_n, evidence = rigid_motion(rotations(TURNS, 180.0)), lambda T, _width: -log_prior(T, settings)
+    hypotheses = find_hypotheses(frame.source, ModelSurface(frame.target), found_n, settings, random, evidence)
     return np.stack([frame.pose(hypothesis.T) for hypothesis in hypotheses]), weights_of(hypotheses)
 
 
@@ -84,10 +79,9 @@ def align_from_many(
     points: Annotated[int, Bounds(minimum=FEWEST)] = 512,
     unit: Positive = 1.0,
 ) -> Outcome:
-    """Run ICP from the starts of the search on `points` of the source, at first within `wide_distance`.
+    """Run ICP from the starts of the search on `points` of the source; refine the end of the least trimmed cost.
 
-    The result, at last on all points, is the end of the least mean square over the smallest distances, the share
-    `overlap` of all, or of the best of these the likeliest under the mixture, whose width and outliers are fitted.
+    The cost is over the share `overlap` of all distances; by likelihood, the best ends are compared by the mixture.
     """
     frame = Frame(pair, pair.T_target_source_init, unit)
     kept = generator("registration", "many starts", pair.seed).permutation(len(frame.source))[:points]

@@ -1,8 +1,4 @@
-"""How many times too large what was observed is for the model, by Gauss-Newton steps of similarities.
-
-A scale other than 1 is believed if its posterior is the larger one; a density in the observed cloud's own unit pays for
-shrinking to a part of the model.
-"""
+"""How many times too large what was observed is for the model, by Gauss-Newton steps of similarities."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -26,30 +26,23 @@ CORNER = 1.5  # of the spacing: so far from a point, along its plane, its surfac
 
 
 class ModelSurface:
-    """A model (M, 3) with its local planes.
-
-    Attributes:
-        spacing: median distance to the nearest other point; spacing_M: mean distance (M,) to the three nearest.
-        centers, normals, tangents: (M, 3), (M, 3) and (M, 2, 3) of the planes through each point and its neighbors.
-        roughness: variance of the distance between a plane and points of the surface that had no part in it, beyond
-            that of the points that had.
-        center, noise: (3,) of the whole shape, and standard deviation of some points; 0 but for a completed model.
-    """
+    """A model (M, 3) with its local planes."""
 
     def __init__(self, points: np.ndarray) -> None:
         self.points = np.ascontiguousarray(points, np.float64)
-        self.center, self.noise = np.zeros(3), 0.0
+        self.center, self.noise = np.zeros(3), 0.0  # of the whole shape, and of some points, if it is completed
         self.tree = cKDTree(self.points)
         neighbors = min(8 if len(points) < 256 else 10 if len(points) < 512 else 12, len(points) - 1)
         distances, rows = self.tree.query(self.points, neighbors + 1)
         self.spacing = max(float(np.median(distances[:, 1])), LEAST_SPACING)
-        self.spacing_M = distances[:, 1:4].mean(axis=1)
+        self.spacing_M = distances[:, 1:4].mean(axis=1)  # mean distance to the three nearest
         around = self.points[rows]  # each point first
         self.centers, axes = _planes(around)
         others, other_axes = _planes(around[:, 1:])
-        self.normals, self.tangents = axes[:, :, 0], np.swapaxes(axes[:, :, 1:], 1, 2)
+        self.normals, self.tangents = axes[:, :, 0], np.swapaxes(axes[:, :, 1:], 1, 2)  # (M, 3) and (M, 2, 3)
         own = dots(self.points - self.centers, self.normals)
         left_out = dots(self.points - others, other_axes[:, :, 0])
+        # Variance of the distance of points from planes in which they had no part, beyond that of those that had.
         self.roughness = max(trimmed_square(left_out) - trimmed_square(own), 0.0)
 
     @cached_property

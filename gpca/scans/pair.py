@@ -64,6 +64,16 @@ class ScanPair:
         return 1.0 if self.kind == "room" else self.size_m / ROOM_M
 
     @property
+    def unit_m(self) -> float:
+        """The length that counts as the diameter of whole objects does: the usual size of a scan."""
+        return ROOM_M * self.scale
+
+    @property
+    def middle_3(self) -> np.ndarray:
+        """The middle of the box around the target, in meters."""
+        return (self.target_M_3.min(axis=0).astype(np.float64) + self.target_M_3.max(axis=0)) / 2
+
+    @property
     def overlap_m(self) -> float:
         """The distance within which points of both scans count as the same surface."""
         return OVERLAP_M * self.scale

@@ -152,48 +152,36 @@ class ScanPairs(Container):
     def __getitem__(self, k: int) -> ScanPair:
         """Return pair number k; its points are float64."""
         source, target = int(self.source_scan[k]), int(self.target[k])
+        viewpoint, known = self.viewpoint.astype(np.float64), self.viewpoint_known
+        kind: Kind = "object" if self.kind[k] == "object" else "room"
         return ScanPair(
             self.part("points", source).astype(np.float64),
             self.part("points", target).astype(np.float64),
             self.T_target_source[k],
-            overlap=float(self.overlap[k]),
-            scene=str(self.scene[k]),
-            kind="object" if self.kind[k] == "object" else "room",
-            size_m=float(self.size_m[k]),
-            source_name=str(self.scan[source]),
-            target_name=str(self.scan[target]),
-            source_viewpoint_3=self._viewpoint(source),
-            target_viewpoint_3=self._viewpoint(target),
+            *(float(self.overlap[k]), str(self.scene[k]), kind, float(self.size_m[k])),
+            *(str(self.scan[source]), str(self.scan[target])),
+            *(viewpoint[source] if known[source] else None, viewpoint[target] if known[target] else None),
             family=str(self.cluster[k]),
         )
-
-    def _viewpoint(self, scan: int) -> np.ndarray | None:
-        return self.viewpoint[scan].astype(np.float64) if self.viewpoint_known[scan] else None
 
     @classmethod
     def of(cls, pairs: Iterable[ScanPair]) -> ScanPairs:
         """Collect pairs; a scan that several of a scene share is kept once."""
-        pairs, rows = list(pairs), []
-        number: dict[tuple[str, str], int] = {}
-        scans: list[tuple[str, np.ndarray, np.ndarray | None]] = []
+        pairs = list(pairs)
+        scans: dict[tuple[str, str], tuple[np.ndarray, np.ndarray | None]] = {}  # by scene and name
         for pair in pairs:
-            for name, points, viewpoint in (
-                (pair.source_name, pair.source_N_3, pair.source_viewpoint_3),
-                (pair.target_name, pair.target_M_3, pair.target_viewpoint_3),
-            ):
-                if (pair.scene, name) not in number:
-                    number[pair.scene, name] = len(scans)
-                    scans.append((name, points, viewpoint))
-            rows.append((number[pair.scene, pair.source_name], number[pair.scene, pair.target_name]))
-        row_K_2 = np.array(rows, np.int64).reshape(-1, 2)
+            scans.setdefault((pair.scene, pair.source_name), (pair.source_N_3, pair.source_viewpoint_3))
+            scans.setdefault((pair.scene, pair.target_name), (pair.target_M_3, pair.target_viewpoint_3))
+        number = {scan: i for i, scan in enumerate(scans)}
+        points, viewpoints = zip(*scans.values(), strict=True)
         return cls(
-            points=np.concatenate([points for _, points, _ in scans]).astype(np.float32),
-            offsets=np.cumsum([0, *(len(points) for _, points, _ in scans)]),
-            scan=np.array([name for name, _, _ in scans]),
-            viewpoint=np.array([np.zeros(3) if at is None else at for _, _, at in scans], np.float64),
-            viewpoint_known=np.array([at is not None for _, _, at in scans]),
-            target=row_K_2[:, 1],
-            source_scan=row_K_2[:, 0],
+            points=np.concatenate(points).astype(np.float32),
+            offsets=np.cumsum([0, *map(len, points)]),
+            scan=np.array([name for _, name in scans]),
+            viewpoint=np.array([np.zeros(3) if at is None else at for at in viewpoints], np.float64),
+            viewpoint_known=np.array([at is not None for at in viewpoints]),
+            target=np.array([number[pair.scene, pair.target_name] for pair in pairs]),
+            source_scan=np.array([number[pair.scene, pair.source_name] for pair in pairs]),
             **{name: np.array([getattr(pair, name) for pair in pairs]) for name in PER_PAIR},  # type: ignore[arg-type]
         )
 

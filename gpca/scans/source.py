@@ -280,11 +280,8 @@ def scenes_of(entry: ScanEntry, place: Path | None, role: str, most_points: int)
     elif place is None:
         raise InputError(entry.title, "its data is not there", "set data_dir")
     else:
-        found = (
-            scene
-            for scene in READERS[entry.kind](entry, place)
-            if (scene.name in entry.development) == (role == DEVELOPMENT)
-        )
+        develops = role == DEVELOPMENT
+        found = (each for each in READERS[entry.kind](entry, place) if (each.name in entry.development) == develops)
     empty = True
     for scene in found:
         empty = False

@@ -50,13 +50,13 @@ def compound(name: str, views: int) -> ScannedScene:
     meshes = []
     for _ in range(random.integers(4, 7)):
         at_3, extent_3 = random.uniform(-0.2, 0.2, 3), random.uniform(0.2, 0.6, 3)
-        kind = random.integers(3)
-        if kind == 0:
-            solid = box(extent_3, at_3)
-        elif kind == 1:
-            solid = cylinder(extent_3[0] / 2, extent_3[1] + 0.2, at_3, "xyz"[random.integers(3)])
-        else:
-            solid = ellipsoid(extent_3 / 2, at_3)
+        match random.integers(3):
+            case 0:
+                solid = box(extent_3, at_3)
+            case 1:
+                solid = cylinder(extent_3[0] / 2, extent_3[1] + 0.2, at_3, "xyz"[random.integers(3)])
+            case _:
+                solid = ellipsoid(extent_3 / 2, at_3)
         vertices, faces = mesh_of(solid)
         meshes.append((vertices * size_m, faces))
     places = []
@@ -124,11 +124,8 @@ def _furniture(at_2: np.ndarray, extent_3: np.ndarray, random: np.random.Generat
         solids = [box((0.5, 0.5, height), (u, v, height / 2)), box((0.5, 0.1, 0.6), (u, v + 0.2, height + 0.3))]
     for _ in range(random.integers(0, 4) if height < 1.3 else 0):
         w, d, h = random.uniform(0.08, 0.3, 3)
-        spot = (u + random.uniform(-0.3, 0.3) * width, v + random.uniform(-0.3, 0.3) * depth)
-        if random.integers(2):
-            solids.append(box((w, d, h), (*spot, height + h / 2)))
-        else:
-            solids.append(cylinder(w / 2, h, (*spot, height + h / 2)))
+        at = (u + random.uniform(-0.3, 0.3) * width, v + random.uniform(-0.3, 0.3) * depth, height + h / 2)
+        solids.append(box((w, d, h), at) if random.integers(2) else cylinder(w / 2, h, at))
     return solids
 
 

@@ -46,7 +46,7 @@ def test_no_natural_registration_fails_by_noise():
     assert table["crop"][0] == pytest.approx(1 - pair.overlap)
     assert table["rotation_rad"][0] == pytest.approx(np.deg2rad(20))
     assert table["translation"][0] == pytest.approx(
-        0.3 / module.unit_of(pair), abs=0.03
+        0.3 / pair.unit_m, abs=0.03
     )  # of the points that are drawn
 
 
@@ -137,7 +137,7 @@ def test_what_finds_no_correspondence_failed_by_its_pose_and_a_ball_holds_none()
 def test_the_registrations_know_where_the_source_truly_lies():
     pair = corner_pair(1.0)
     causes, _ = measured(pair, module.ScanStart(0, module.LADDER, "rung", start_off(pair, 40, 0.5)))
-    registrations, unit_m = causes.registrations, module.unit_of(pair)
+    registrations, unit_m = causes.registrations, pair.unit_m
     middle = (pair.target_M_3.min(axis=0) + pair.target_M_3.max(axis=0)) / 2
     placed = transform(registrations.T_target_source("true", 0), registrations.source(0)) * unit_m + middle
     assert cKDTree(transform(pair.T_target_source, pair.source_N_3)).query(placed)[0].max() < 1e-4

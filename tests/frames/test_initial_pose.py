@@ -40,8 +40,7 @@ def test_features_find_an_object_that_has_no_symmetry(tiny):
     instances, objects = tiny
     index = objects.row("tiny bracket")
     diameter_m = objects.diameters_m[index]
-    settings = InitialPoseSettings(tries=10)
-    registration = GlobalRegistration(objects.points(index), objects.normals_of(index), diameter_m, settings)
+    registration = GlobalRegistration(objects, index, InitialPoseSettings(tries=10))
     rows = np.flatnonzero(instances.object_index == index)
     rows = rows[np.argsort(-np.diff(instances.offsets)[rows])][:2]  # the best seen
     found = [registration.register(instances.cloud_m(i), seed=1) for i in rows]
