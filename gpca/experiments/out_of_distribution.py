@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from functools import partial
+from itertools import product
 from math import inf
 from typing import Annotated, Any
 
@@ -114,9 +115,7 @@ def collect(run: Run, prediction_files: Paths, set_files: Paths) -> tuple[Frame,
     for (source, learner, seed), rows in predicted.read_learner_predictions(prediction_files, set_files).items():
         answers.setdefault((source, learner), []).append(rows.assign(seed=seed))
         for name, subset in predicted.sets_of(rows).items():
-            values = correlations(subset)
-            if "+" not in name:
-                values |= probability_metrics(subset)
+            values = correlations(subset) | ({} if "+" in name else probability_metrics(subset))
             by_seed += [(TABLE + name, source, learner, metric, ALL, seed, float(v)) for metric, v in values.items()]
     for (source, learner), parts in answers.items():
         for name, subset in predicted.sets_of(pd.concat(parts, ignore_index=True)).items():
@@ -158,16 +157,13 @@ def probability_metrics(rows: Frame) -> dict[str, float]:
         "brier": diagnostics.brier_score(p_S_C, target_S),
         "test_samples": len(rows),
     }
-    for score in predicted.scores_of(rows):
-        for area in AREAS:
-            values[f"{area}_{score}"] = getattr(diagnostics, area)(-rows[score].to_numpy(), wrong_S)
-    return values
+    areas = product(predicted.scores_of(rows), AREAS.items())
+    return values | {f"{area}_{score}": of(-rows[score].to_numpy(), wrong_S) for score, (area, of) in areas}
 
 
 def clusters_of(rows: Frame) -> list[str]:
     """Cluster of each sample: its family, apart from that of the same name in the set of the other source."""
-    is_other = rows["set"] == "source"
-    return [f"{'other/' * other}{name}" for other, name in zip(is_other, rows["cluster"], strict=True)]
+    return list(rows["cluster"].where(rows["set"] != "source", "other/" + rows["cluster"]))
 
 
 SECTION = "IV-D Ablation studies"
@@ -199,12 +195,11 @@ def _show(metric: str, title: str, name: str = "in_distribution", source: str = 
     **INTERVALS,
 )
 def table5_learners(run: Run, intervals: Frame) -> Table:
+    areas = {"aurc": "AURC", "excess_aurc": "E-AURC", "augrc": "AUGRC"}
     columns = {
         "accuracy": _show("accuracy", "Accuracy (%)"),
         "rho": _show(RHO, "ρ", **RHO_LOOK),
-        "aurc": _show("aurc_max_score", "AURC", **AREA_LOOK),
-        "excess_aurc": _show("excess_aurc_max_score", "E-AURC", **AREA_LOOK),
-        "augrc": _show("augrc_max_score", "AUGRC", **AREA_LOOK),
+        **{area: _show(f"{area}_max_score", title, **AREA_LOOK) for area, title in areas.items()},
         "ece": _show("ece", "ECE (share)", **ERROR_LOOK),
         "nll": _show("nll", "NLL (nats)", **ERROR_LOOK | {"limits": (0, inf)}),
         "brier": _show("brier", "Brier", **ERROR_LOOK | {"limits": (0, 2)}),
@@ -270,11 +265,8 @@ def _by_source(
     rows: list[Row] = crossed(("source", run.source_titles), ("method", learner_titles(run.config)))
     sheet = Sheet(name, {"source": "Dataset", "learner": "Learner"}, rows, columns, intervals)
     shown = [row.labels[0][0] for row in sheet.rows]
-    counts = [
-        f"{samples_of_seed(intervals, shown[0], part)} {in_words(part)}"
-        for part in TRAINED_ON
-        if len(rows_where(intervals, table=TABLE + part, source=shown[0]))
-    ]
+    there = set(rows_where(intervals, source=shown[0])["table"].str.removeprefix(TABLE))
+    counts = [f"{samples_of_seed(intervals, shown[0], part)} {in_words(part)}" for part in TRAINED_ON if part in there]
     samples = f"Test samples of a seed (of the first dataset): {', '.join(counts)}. Bold: best of a dataset."
     first = f"{over_clusters(sheet.seeds)}. {OF_SEEDS} {samples}"
     return sheet.table(caption + run.stand_ins(shown), "quantity", (first, *notes), bold=columns, same=1)

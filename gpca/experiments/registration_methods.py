@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import partial
+from itertools import product
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -221,8 +222,7 @@ LEAD: dict[str, Any] = {"where": {"against": RIVAL}, "limits": (-100.0, 100.0)}
 NO_INTERVAL: dict[str, Any] = {"interval": False, "limits": (0, inf)}
 SEVERITIES = {
     f"{cause}_{name}": show("success", f"{cause.capitalize()}, {name} (%)", f"{cause}_{name}", decimals=0)
-    for cause in CONCEPTS
-    for name in BINS
+    for cause, name in product(CONCEPTS, BINS)
 } | {
     f"lead_{cause}": show("success", f"{cause.capitalize()}, lead (points)", cause, decimals=0, **LEAD)
     for cause in CONCEPTS
@@ -250,15 +250,20 @@ def table11_registration(run: Run, intervals, metrics, seconds):
         columns[success_within(limit)] = show(success_within(limit), f"Off by less than {100 * limit:g} % d (%)")
     rows = method_rows(run.config["methods"], run.config["method_pairs"]["global_start"])
     sheet = Sheet("table11_registration", HEADS, rows, columns, intervals, by_seed, list(run.sources))
-    note = (
+    pairs = int(intervals.loc[intervals["concept"] == ALL, "samples"].max())
+    notes = (
+        f"{sheet.over(pairs // sheet.seeds)}. A success is off by less than the config's `success.error` of the "
+        "diameter d, ADD or, for symmetric objects, ADD-S. A registration that failed by the method's own account is "
+        "no success. Bold: best of a start.",
+        *missing_methods(run.config["methods"]),
         "Lead: how many more succeed than by the best other method of the same start, pair by pair. "
         "Errors are means over all registrations, at the last pose of those that failed; rotations up to the object's "
         "symmetries. Failed: given up by the method itself, or not at rest. Points: of a cloud, on average. ms: of one "
         "registration, with its global start if it has one, without the normals; it differs from run to run. Low, "
-        "middle, high: thirds of what is drawn, a pose error by the mean of its places in the two ranges."
+        "middle, high: thirds of what is drawn, a pose error by the mean of its places in the two ranges.",
     )
     caption = "Registrations that succeed, and how far all are off" + run.stand_ins()
-    return sheet.table(caption, "metric", [*notes(run, sheet, intervals), note], bold=CAUSES | ERRORS, same=1)
+    return sheet.table(caption, "metric", notes, bold=CAUSES | ERRORS, same=1)
 
 
 def method_rows(names: Iterable[str], global_start: str, initial: str = "Initial pose") -> Iterable[Row]:
@@ -267,20 +272,9 @@ def method_rows(names: Iterable[str], global_start: str, initial: str = "Initial
     starts = {INITIAL: initial, NO_START: "None"}
     if global_start in entries:
         starts[global_start] = entries[global_start].title
-    for key, title in starts.items():
-        for name, entry in entries.items():
-            if entry.is_global == (key == NO_START):
-                yield Row([(key, title), (name, entry.title)], {"method": row_name(name, key)})
-
-
-def notes(run: Run, sheet: Sheet, intervals: Frame) -> list[str]:
-    pairs = int(intervals.loc[intervals["concept"] == ALL, "samples"].max())
-    return [
-        f"{sheet.over(pairs // sheet.seeds)}. A success is off by less than the config's `success.error` of the "
-        "diameter d, ADD or, for symmetric objects, ADD-S. A registration that failed by the method's own account is "
-        "no success. Bold: best of a start.",
-        *missing_methods(run.config["methods"]),
-    ]
+    for start, (name, entry) in product(starts.items(), entries.items()):
+        if entry.is_global == (start[0] == NO_START):
+            yield Row([start, (name, entry.title)], {"method": row_name(name, start[0])})
 
 
 def missing_methods(names: Iterable[str]) -> list[str]:
