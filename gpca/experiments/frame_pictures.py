@@ -14,7 +14,7 @@ from gpca.experiments.registration_stages import draw_scores, source_before_icp
 from gpca.frames.instances import NO_COLOR, Instances
 from gpca.frames.synthesis import HALF_SPACE, OCCLUDER
 from gpca.io.container import require_same_samples
-from gpca.io.csv_file import numbers, read_csv
+from gpca.io.csv_file import read_numbers
 from gpca.io.files import read_image
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import FRAME_COLUMNS, Registrations
@@ -79,11 +79,9 @@ def draw_real_world_example(
     drawing, [drawn] = panels(1, 4, HEIGHT_IN, width_ratios=(3, 3, 3, 2.2))
     model_m = objects.points(int(instances.object_index[i]))[:3000]
     observed_m = diameter_m * registrations.cloud(row)
-    seen = {
-        (pose, name): project(pose, points_m)
-        for pose, source_m in (("init", diameter_m * source_before_icp(registrations, row)), ("icp", observed_m))
-        for name, points_m in (("model", model_m), ("source", source_m))
-    }
+    seen = {(pose, "model"): project(pose, model_m) for pose in poses}
+    seen["init", "source"] = project("init", diameter_m * source_before_icp(registrations, row))
+    seen["icp", "source"] = project("icp", observed_m)
     own_px = instances.pixels_of(i)
     everything = np.concatenate([own_px, *seen.values()])
     low_2, high_2 = everything.min(axis=0), everything.max(axis=0)
@@ -96,33 +94,28 @@ def draw_real_world_example(
         half = min(times * np.max(high_2 - low_2), *size_2) / 2
         u, v = np.clip((low_2 + high_2) / 2, half, size_2 - half)
         panel.set(xlim=(u - half - 0.5, u + half - 0.5), ylim=(v + half - 0.5, v - half - 0.5))
+        panel.set_axis_off()
         if lost.any():
             panel.contourf(lost, [0.5, 1.5], colors=BLACK, alpha=0.5)
             panel.contour(lost, [0.5], colors=BLACK, linewidths=0.8)
     large = float(np.clip(2000 / len(observed_m), 1.1, 5))  # Few points are drawn larger.
-    for panel, pose in ((drawn[1], "init"), (drawn[2], "icp")):
+    for panel, pose in zip(drawn[1:3], poses, strict=True):
         panel.scatter(*seen[pose, "model"].T, linewidths=0, color=TARGET_COLOR, s=0.7)
         panel.scatter(*seen[pose, "source"].T, linewidths=0, color=SOURCE_COLOR, s=large)
     origin, *tips = project("icp", np.vstack([np.zeros(3), 0.3 * diameter_m * np.eye(3)]))
     ends_2_2 = np.sort([drawn[2].get_xlim(), drawn[2].get_ylim()], axis=1)
     margin_2 = 0.06 * np.ptp(ends_2_2, axis=1)  # A letter stands whole within the panel.
-    outline = [withStroke(linewidth=2.4, foreground="white")]
-    arrow: dict[str, Any] = {"arrowstyle": "-|>", "color": BLACK, "lw": 1.2, "mutation_scale": 7}
-    letter: dict[str, Any] = {"ha": "center", "va": "center", "path_effects": outline, "fontweight": "bold"}
+    look: dict[str, Any] = {"color": BLACK, "path_effects": [withStroke(linewidth=2.4, foreground="white")]}
+    arrow = look | {"arrowstyle": "-|>", "lw": 1.2, "mutation_scale": 7, "shrinkA": 0}
     for tip, name in zip(tips, "xyz", strict=True):
-        drawn[2].annotate("", tip, origin, arrowprops=arrow | {"shrinkA": 0, "path_effects": outline})
+        drawn[2].annotate("", tip, origin, arrowprops=arrow)
         place = np.clip(tip + 0.15 * (tip - origin), ends_2_2[:, 0] + margin_2, ends_2_2[:, 1] - margin_2)
-        drawn[2].text(*place, name, color=BLACK, **letter)
+        drawn[2].text(*place, name, ha="center", va="center", fontweight="bold", **look)
     draw_scores(drawn[3], sample)
     failed = ", failed" if sample["icp_error"] >= success else ""
-    captions = (
-        "(a) Region of interest; black: covered",
-        f"(b) Initial pose: {100 * sample['init_error']:.1f} % $d$ off",
-        f"(c) After ICP: {100 * sample['icp_error']:.1f} % $d$ off{failed}",
-    )
-    for panel, caption in zip(drawn[:3], captions, strict=True):
-        panel.set_axis_off()
-        write_below(panel, caption)
+    write_below(drawn[0], "(a) Region of interest; black: covered")
+    write_below(drawn[1], f"(b) Initial pose: {100 * sample['init_error']:.1f} % $d$ off")
+    write_below(drawn[2], f"(c) After ICP: {100 * sample['icp_error']:.1f} % $d$ off{failed}")
     drawn[3].set_xlabel("(d) Scores, the truth bold", labelpad=1)
     share = f"{100 * registrations.severity_crop[row]:.0f} % of the points lost to {LOST_TO[sample['lost_to']]}"
     name = str(registrations.object_name[row])
@@ -135,11 +128,10 @@ def draw_real_world_example(
 
 def read_samples(poses_csv: str | Path, predictions_csv: str | Path) -> Frame:
     """Poses and predictions of all samples side by side, in the order of the registrations."""
-    poses, predictions = read_csv(poses_csv, POSE_COLUMNS, others=FRAME_COLUMNS), read_predictions(predictions_csv)
+    poses = read_numbers(poses_csv, POSE_COLUMNS, ("instance", "init_error", "icp_error"), others=FRAME_COLUMNS)
+    predictions = read_predictions(predictions_csv)
     require_same_samples(poses_csv, poses, predictions, "predictions")
-    for name in ("instance", "init_error", "icp_error"):
-        poses[name] = numbers(poses_csv, poses, name)
-    return poses.join(predictions[[name for name in predictions.columns if name not in poses.columns]])
+    return poses.join(predictions[predictions.columns.difference(poses.columns, sort=False)])
 
 
 def choose_sample(samples: Frame, path: str | Path, pixels_I: np.ndarray, success: float) -> int:

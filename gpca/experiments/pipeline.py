@@ -79,6 +79,7 @@ def first_round(
 ) -> Round:
     """Fit the classifier that does not know a concept yet, as learning curves do, and choose from the pool."""
     from sklearn.decomposition import PCA
+    from sklearn.pipeline import make_pipeline
     from sklearn.preprocessing import StandardScaler
 
     from gpca.active_learning.rounds import initial_gpc, make_task, pool_of
@@ -94,11 +95,9 @@ def first_round(
     pool = pool_of(task.project(gpc), gpc, np.arange(len(rows_N)), [])
     random = generator(source, seed, SETTING, "active_learning", held_out, STRATEGY)
     chosen = select(STRATEGY, pool, settings.batch, random)
-    train = samples.rows("train")
-    scaler = StandardScaler().fit(stages.h_S_d[train])
-    h_S_d = scaler.transform(stages.h_S_d)
-    map_S_2 = PCA(2, svd_solver="full").fit(h_S_d[train]).transform(h_S_d)
-    return Round(rows_N, labeled, map_S_2, pool.bald_N, top(pool.bald_N, settings.batch * EXPANSION), chosen)
+    to_map = make_pipeline(StandardScaler(), PCA(2, svd_solver="full")).fit(stages.h_S_d[samples.rows("train")])
+    map_S_2, candidates = to_map.transform(stages.h_S_d), top(pool.bald_N, settings.batch * EXPANSION)
+    return Round(rows_N, labeled, map_S_2, pool.bald_N, candidates, chosen)
 
 
 def _curves(files: Sequence[Path]) -> tuple[str, dict[str, Frame]]:
@@ -168,10 +167,8 @@ def _draw_active_learning(canvas: Canvas, stages: drawing.Staged, labeling: Roun
     panel.scatter(*points_N_2[order].T, s=9, c=bald_N[order], cmap=style.blues(), edgecolors=style.GRAY, linewidths=0.3)
     panel.scatter(*points_N_2[labeling.candidates].T, s=26, facecolors="none", edgecolors=style.BLACK, linewidths=0.7)
     panel.set_axis_off()
-    words = (
-        f"{bald_N.min():.2f} to {bald_N.max():.2f} nats; $B K$ = {len(labeling.candidates)}\nringed; ×: labeled before"
-    )
-    canvas.text(5.04, captions_in, words, va="bottom")
+    words = f"{bald_N.min():.2f} to {bald_N.max():.2f} nats; $B K$ = {len(labeling.candidates)}"
+    canvas.text(5.04, captions_in, f"{words}\nringed; ×: labeled before", va="bottom")
     canvas.arrow((4.46, middle_in), (4.24, middle_in))
 
     canvas.text(3.66, heads_in, "Diversify: $k$-means", va="top")

@@ -31,16 +31,12 @@ HIDDEN: Look = (style.YELLOW, "--")
 PLACED: Look = (style.TARGET_COLOR, "-")  # of the model where ICP put it
 LINE_PT, RIM_PT = 1.0, 1.9
 SHAPES: dict[str, tuple[int | str, ...]] = {
-    "object": (),
-    "cause": (),
-    "action": (),
+    **dict.fromkeys(("object", "cause", "action", "surface_first", "chosen"), ()),
     "scores": (len(CONCEPTS),),
     "errors": (2,),
     "viewpoints_n_3": ("V", 3),
     "viewpoint_first": (3,),
     "surface_n": ("V",),
-    "surface_first": (),
-    "chosen": (),
     **{f"image_{view}": ("H", "W", 3) for view in ("first", "next")},
     **{f"{silhouette}_{view}": ("H", "W") for view in ("first", "next") for silhouette in SILHOUETTES},
 }
@@ -76,18 +72,13 @@ def fig1_recovery_example(run: Run, example_npz: str | Path) -> Figure:
     view = "Occluded" if str(example["cause"]) == "overlap" else "First view"
     before, after = (100 * error for error in example["errors"])
     solved = "solved" if after < 100 * run.config["success"]["error"] else "not solved"
-    chosen, first = (100 * share for share in (example["surface_n"][int(example["chosen"])], example["surface_first"]))
+    chosen, first = 100 * example["surface_n"][int(example["chosen"])], 100 * example["surface_first"]
     action = str(example["action"])
     instead = "" if action == ACTION else f" ({in_words(action)})"  # the policy's action, if it is another
-    captions = (
-        f"(a) {view}: pose {before:.0f} % $d$ off",
-        f"(b) Scores, the truth bold{instead}",
-        f"(c) Seen: {first:.0f} %; expected: {chosen:.0f} %",
-        f"(d) New view: {after:.1f} % $d$ off, {solved}",
-    )
-    for letter, caption in zip("acd", (captions[0], *captions[2:]), strict=True):
-        write_below(axes[letter], caption)
-    axes["b"].set_xlabel(captions[1], labelpad=1)
+    write_below(axes["a"], f"(a) {view}: pose {before:.0f} % $d$ off")
+    axes["b"].set_xlabel(f"(b) Scores, the truth bold{instead}", labelpad=1)
+    write_below(axes["c"], f"(c) Seen: {first:.0f} %; expected: {chosen:.0f} %")
+    write_below(axes["d"], f"(d) New view: {after:.1f} % $d$ off, {solved}")
     name = object_in_words(example["object"], dataset_of(entry))
     style.write_title(drawing, f"{tables_title(run)}: {name}")
     outlines = (("where it is", VISIBLE), ("its hidden part", HIDDEN), ("where ICP put it", PLACED))
@@ -158,10 +149,9 @@ def fig6_mitigation(run: Run, policy_json: str | Path) -> Figure:
     dominant = rf"$\mathrm{{max}}_c\,\hat{{s}}_c$ < {limits['dominant']:.2f}"
     uncertain = f"BALD > {limits['uncertain']:.3f} nats\nor {dominant}"
     branches = [(uncertain, "Abstain\nqueue for a person", style.GRAY)]
-    branches += [
-        (f"{concept} dominates", WORDS.get(action, in_words(action)), style.CONCEPT_COLORS[concept])
-        for concept, action in sorted(treatments.items(), key=lambda item: ("pose", "overlap", "noise").index(item[0]))
-    ]
+    for concept in ("pose", "overlap", "noise"):
+        words = WORDS.get(treatments[concept], in_words(treatments[concept]))
+        branches.append((f"{concept} dominates", words, style.CONCEPT_COLORS[concept]))
     middles_in = [1.99 - 0.53 * place for place in range(len(branches))]
     for middle_in, (condition, branch, color) in zip(middles_in, branches, strict=True):
         canvas.box(1.95, middle_in - 0.2, 1.6, 0.4, condition, color, dashed=True)
