@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.explainers.classifiers import PAPERS_RANDOM_STATE, ConceptClassifier, standardized_regression
+from gpca.explainers.classifiers import PAPERS_RANDOM_STATE, standardized_regression
 from gpca.explainers.interface import ClassifierExplainer, ExplainerEntry, attached
 from gpca.pairs.dataset import Registrations
 from gpca.settings import Count, Positive
@@ -38,7 +38,7 @@ class ProbableSVM(Learner):
         if folds < 2:
             raise InputError("training registrations", "have a single sample of a concept", "give at least two")
         svm = SVC(kernel="linear", random_state=PAPERS_RANDOM_STATE)
-        self._classifier = ConceptClassifier(_standardized(CalibratedClassifierCV(svm, cv=folds, ensemble=False)))
+        self._classifier = _standardized(CalibratedClassifierCV(svm, cv=folds, ensemble=False))
         super().fit(registrations)
 
 

@@ -15,25 +15,11 @@ PAPERS_RANDOM_STATE = 42  # of the forest and of the linear SVM in Table V
 LEAF = -1  # in place of a leaf's feature
 
 
-class ConceptClassifier:
-    """A classifier with fixed score columns, whichever labels occur in training."""
-
-    def __init__(self, classifier, labels: tuple[str, ...] = CONCEPTS) -> None:
-        self._classifier = classifier
-        self._labels = labels
-
-    def fit(self, features_N_F: np.ndarray, concept_N: np.ndarray) -> ConceptClassifier:
-        """Learn from labeled features; fewer than two concepts among the labels raise an InputError."""
-        known_concepts(concept_N, self._labels)
-        self._classifier.fit(features_N_F, concept_N)
-        return self
-
-    def scores(self, features_N_F: np.ndarray) -> np.ndarray:
-        """Return probabilities (N, C) in the order of the labels; 0 for a label absent from training."""
-        scores_N_C = np.zeros((len(features_N_F), len(self._labels)))
-        columns = [self._labels.index(concept) for concept in self._classifier.classes_]
-        scores_N_C[:, columns] = self._classifier.predict_proba(features_N_F)
-        return scores_N_C
+def scores_of(classifier, features_N_F: np.ndarray, labels: tuple[str, ...] = CONCEPTS) -> np.ndarray:
+    """Return a fitted classifier's probabilities (N, C) in the order of the labels; 0 for one absent from training."""
+    scores_N_C = np.zeros((len(features_N_F), len(labels)))
+    scores_N_C[:, [labels.index(label) for label in classifier.classes_]] = classifier.predict_proba(features_N_F)
+    return scores_N_C
 
 
 def known_concepts(concept_N: np.ndarray, labels: tuple[str, ...] = CONCEPTS) -> list[str]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from gpca.classifier.scores import Attribution
 from gpca.errors import InputError
-from gpca.explainers.classifiers import ConceptClassifier
+from gpca.explainers.classifiers import known_concepts, scores_of
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 
@@ -120,13 +120,14 @@ class ClassifierExplainer(ScoringExplainer):
     """Scores are the probabilities of an initially unfitted scikit-learn classifier on some features."""
 
     def __init__(self, classifier) -> None:
-        self._classifier = ConceptClassifier(classifier, self.labels)
+        self._classifier = classifier
 
     def fit(self, registrations: Registrations) -> None:
+        known_concepts(registrations.concept, self.labels)
         self._classifier.fit(self.features(registrations), registrations.concept)
 
     def scores(self, registrations: Registrations) -> np.ndarray:
-        return self._classifier.scores(self.features(registrations))
+        return scores_of(self._classifier, self.features(registrations), self.labels)
 
     def features(self, registrations: Registrations) -> np.ndarray:
         raise NotImplementedError

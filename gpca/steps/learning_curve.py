@@ -136,13 +136,13 @@ def _scores(
     from sklearn.ensemble import ExtraTreesClassifier
 
     from gpca.classifier.gpc import GPC
-    from gpca.explainers.classifiers import ConceptClassifier
+    from gpca.explainers.classifiers import scores_of
     from gpca.explainers.pair_classifier import NormalizedFeatures
 
     if name == "trees":
         state = seed_of(*axes) % 2**32
         forest = ExtraTreesClassifier(TREES, min_samples_leaf=2, max_features=0.3, random_state=state)
-        return ConceptClassifier(forest, LABELS).fit(learned.features, learned.concept).scores(tested_N_F)
+        return scores_of(forest.fit(learned.features, learned.concept), tested_N_F, LABELS)
     normalized = NormalizedFeatures(*axes).fit(learned.features)
     gpc = GPC(LABELS, settings, *axes[:2]).fit(normalized(learned.features), learned.concept)
     return gpc.attribute(normalized(tested_N_F))[0]

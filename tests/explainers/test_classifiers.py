@@ -3,7 +3,7 @@ import pytest
 from sklearn.linear_model import LogisticRegression
 
 from gpca.errors import InputError
-from gpca.explainers.classifiers import BoostedQuestion, ConceptClassifier, boosted_trees, require_trees
+from gpca.explainers.classifiers import BoostedQuestion, boosted_trees, known_concepts, require_trees, scores_of
 from gpca.pairs.perturbation import CONCEPTS
 
 CONCEPT_N = np.array(CONCEPTS)[np.arange(60) % 3]
@@ -14,7 +14,7 @@ X = CENTERS[np.arange(60) % 3] + np.random.default_rng(0).normal(size=(60, 2))
 @pytest.mark.parametrize("absent", [*CONCEPTS, None])
 def test_columns_are_the_concepts_although_scikit_learn_sorts_them_and_an_absent_one_scores_0(absent):
     seen = absent != CONCEPT_N
-    scores = ConceptClassifier(LogisticRegression()).fit(X[seen], CONCEPT_N[seen]).scores(CENTERS)
+    scores = scores_of(LogisticRegression().fit(X[seen], CONCEPT_N[seen]), CENTERS)
     others = [c for c in range(3) if CONCEPTS[c] != absent]
     assert (np.delete(scores, others, axis=1) == 0).all()
     assert scores.argmax(axis=1)[others].tolist() == others
@@ -24,7 +24,7 @@ def test_columns_are_the_concepts_although_scikit_learn_sorts_them_and_an_absent
 @pytest.mark.parametrize("rows", [[0, 3, 6], []])
 def test_training_on_fewer_than_two_concepts_is_refused(rows):
     with pytest.raises(InputError, match="training registrations: cover fewer than two concepts"):
-        ConceptClassifier(LogisticRegression()).fit(X[rows], CONCEPT_N[rows])
+        known_concepts(CONCEPT_N[rows])
 
 
 @pytest.fixture(scope="module")
