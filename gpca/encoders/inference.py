@@ -69,7 +69,14 @@ class TrainedEncoder:
                 module = make_encoder(self.settings.backbone, self.settings.options)
             shapes = {name: tuple(part.shape) for name, part in module.state_dict().items()}
             size = module.embedding_size
-        require_shapes(self.weights, shapes, "encoder")
+        if not isinstance(self.weights, Mapping) or set(self.weights) != set(shapes):
+            raise ValueError("its encoder has different parts")
+        for name, shape in shapes.items():
+            value, dtype = self.weights[name], np.int64 if name.endswith("num_batches_tracked") else np.float32
+            if not isinstance(value, np.ndarray) or value.shape != tuple(shape) or value.dtype != dtype:
+                raise ValueError(f"'{name}' of its encoder has a different shape or type")
+            if name.endswith("running_var") and (value < 0).any():
+                raise ValueError(f"'{name}' of its encoder contains negative variances")
         return size
 
 
@@ -114,13 +121,13 @@ def nearest(x_B_N_F: np.ndarray, k: int, sizes: Sequence[int] | None = None) -> 
     return edge_kernels.smallest_k(product(rows_B_N_G, np.swapaxes(columns_B_N_G, 1, 2)), k)
 
 
-def expected_shapes(point_features: int = 256, inputs: int = 3, widths: Sequence[int] = WIDTHS) -> dict[str, tuple]:
+def expected_shapes(point_features: int) -> dict[str, tuple]:
     """Return the shape of every array in the state of a DGCNN."""
     shapes: dict[str, tuple] = {}
-    for layer, (before, after) in enumerate(zip((inputs, *widths[:-1]), widths, strict=True)):
+    for layer, (before, after) in enumerate(pairwise((3, *WIDTHS))):
         shapes[f"edge_convs.{layer}.weight"] = (after, 2 * before)
         shapes |= _norm_shapes(f"edge_convs.{layer}.norm", after)
-    return shapes | {"point_layer.weight": (point_features, sum(widths))} | _norm_shapes("point_norm", point_features)
+    return shapes | {"point_layer.weight": (point_features, sum(WIDTHS))} | _norm_shapes("point_norm", point_features)
 
 
 def _norm_shapes(name: str, features: int) -> dict[str, tuple]:
@@ -183,15 +190,3 @@ def _added(rows: np.ndarray) -> np.ndarray:
         total = total + rows[blocked:].sum(axis=0)
         rows = rows[:blocked].reshape(blocked // BLOCK, BLOCK, *rows.shape[1:]).sum(axis=1)
     return total
-
-
-def require_shapes(state: object, shapes: Mapping[str, tuple], what: str) -> None:
-    """Raise a ValueError unless a state has arrays of these names and shapes, and no negative variances."""
-    if not isinstance(state, Mapping) or set(state) != set(shapes):
-        raise ValueError(f"its {what} has different parts")
-    for name, shape in shapes.items():
-        value, dtype = state[name], np.int64 if name.endswith("num_batches_tracked") else np.float32
-        if not isinstance(value, np.ndarray) or value.shape != tuple(shape) or value.dtype != dtype:
-            raise ValueError(f"'{name}' of its {what} has a different shape or type")
-        if name.endswith("running_var") and (value < 0).any():
-            raise ValueError(f"'{name}' of its {what} contains negative variances")
