@@ -125,9 +125,8 @@ CURVES = {"curve_files": "active_learning/{source}/{pool_strategy}/seed{seed}.cs
     SECTION,
     "Table III: labels needed for a new concept",
     """Table III of the paper: how many labels, chosen by BALD with k-means, by BALD or at random, a classifier needs
-    to reach the target accuracy when it meets a concept that it has never seen. Rows differ in the share of the new
-    concept in the pool and in whether the encoder had seen it, which the paper leaves open; the row with 5 % follows
-    it.""",
+    for a concept that it has never seen. Rows differ in the share of the new concept in the pool and in whether the
+    encoder had seen it, which the paper leaves open; the row with 5 % follows it.""",
     paper=True,
     **INPUTS,
 )
@@ -193,7 +192,7 @@ def _table(
     SECTION,
     "Learning curves",
     """Accuracy over the number of labels, by strategy: the mean over the concepts, each held out in turn, and over the
-    seeds. The paper's two strategies are thick, have 95 % intervals over the seeds and stand in every panel.""",
+    seeds. The paper's two strategies are thick and have 95 % intervals over the seeds.""",
     needs=("further_concept",),
     **CURVES,
 )
@@ -205,8 +204,7 @@ def active_learning_curves(run: Run, curve_files: Paths) -> Figure:
     SECTION,
     "Learning curves, overlap held out",
     """The curves behind Table III: the paper's experiment alone, in which overlap is the new concept. The last row
-    shows the paper's classifier and a pool in which the concept is rare. The paper's two strategies are thick, have
-    95 % intervals over the seeds and stand in every panel.""",
+    shows the paper's classifier and a pool in which the concept is rare.""",
     **CURVES,
 )
 def active_learning_overlap(run: Run, curve_files: Paths) -> Figure:
@@ -254,8 +252,7 @@ def table3_extended(run: Run, metrics: Frame, clusters: Clusters) -> Table:
 @table(
     SECTION,
     "Table III on a stream",
-    """Samples arrive one by one, and a label must be requested at once or never: the number of arrivals until the new
-    concept is recognized, and the number of labels that this costs.""",
+    """Samples arrive one by one, and a label must be requested at once or never: how soon is the new concept known?""",
     **INPUTS,
 )
 def table3_stream(run: Run, metrics: Frame, clusters: Clusters) -> Table:

@@ -42,10 +42,10 @@ GAP = 0.5  # of a row, between the measured shares and the scores, which are non
 @figure(
     SECTION,
     "One failed registration and its counterfactuals",
-    """A failed registration of several causes, registered again with every subset of these: Shapley's value φ of a
-    cause is what it added to the error. Below are the scores of some explainers, which saw only the registration with
-    all causes, and who names the dominant cause (right), one that adds nearly as much (tie) or another (wrong). Shown
-    is the failure with a clear cause, at least 0.6 of the sum, whose margin over the next φ is the median.""",
+    """A failed registration, registered again with every subset of its causes: Shapley's value φ of a cause is what it
+    added to the error. Below are the scores of some explainers, which saw all causes at once, and who names the
+    dominant cause (right), one that adds nearly as much (tie) or another (wrong). Shown is the median failure by
+    margin among those with a clear cause, at least 0.6 of the sum.""",
     objects_npz="objects/{shown_source}.npz",
     causes_npz="causes/{shown_source}/seed{first_seed}.npz",
     predictions_csv="diagnoses/{shown_source}/{cause_explainer}/seed{first_seed}.csv",
@@ -91,9 +91,8 @@ IN_BRIEF = {"reenact": "re-enactment", "gpca": "GP-CA", "rule": "rule"}  # expla
 @figure(
     SECTION,
     "Failures, and what explainers name",
-    """A failed test registration of each dataset and each dominant cause, as ICP left it, with its error relative to
-    the diameter: of its kind, the one whose error is the median. Below stands who names the dominant cause, who one
-    that adds nearly as much (tie), and who another, which follows in brackets.""",
+    """A failed test registration of each dataset and each dominant cause, the one of median error, as ICP left it.
+    Below stands who names the dominant cause, who one that adds nearly as much (tie), and who another.""",
     objects_files="objects/{source}.npz",
     causes_files="causes/{source}/seed{first_seed}.npz",
     predictions_csv="diagnoses/{source}/{cause_explainer}/seed{first_seed}.csv",

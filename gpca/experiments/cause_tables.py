@@ -51,9 +51,8 @@ def counts_and_calls(costs: Mapping[str, Mapping]) -> Callable[[Row, Frame], dic
 
     def cells(row: Row, subset: Frame) -> dict[str, Cell]:
         judged, seeds = subset["samples"].max(), int(subset["seeds"].iloc[0])
-        calls = costs.get(row.where["method"], {}).get("icp_calls")
-        shown = {"samples": plain_cell(judged, seeds, int(judged))}
-        return shown if calls is None else shown | {"icp_calls": plain_cell(calls, seeds, int(judged))}
+        counts = {"samples": judged, "icp_calls": costs.get(row.where["method"], {}).get("icp_calls")}
+        return {key: plain_cell(count, seeds, int(judged)) for key, count in counts.items() if count is not None}
 
     return cells
 
@@ -61,10 +60,9 @@ def counts_and_calls(costs: Mapping[str, Mapping]) -> Callable[[Row, Frame], dic
 @table(
     SECTION,
     "Table IX: what is wrong, and why",
-    """Every explainer on registrations whose true causes are measured: does it say whether anything is wrong and which
-    cause did most, and how much of the error would vanish without the cause that it names first? Nothing was trained on
-    a test object. The last row of a dataset is the truth measured again from other starts, which knows the true pose
-    and the clean clouds, as no observer does.""",
+    """Every explainer on registrations whose true causes are measured: does it say whether anything is wrong, and which
+    cause did most? Nothing was trained on a test object. The last row of a dataset is the truth measured again from
+    other starts, which knows the true pose and the clean clouds, as no observer does.""",
     intervals="cause_intervals.csv",
 )
 def table9_causes(run: Run, intervals):
@@ -130,8 +128,7 @@ def rule_near_chance(intervals: Frame, sources: Iterable[str], **wanted: object)
     SECTION,
     "Table IX by what is read",
     """A forest and GP-CA's classifier on more and more of a registration: the observed cloud alone, both clouds, how
-    far ICP moved them, further runs from other starts, and runs with remedies. Beside each is what it costs in runs of
-    ICP.""",
+    far ICP moved them, further runs from other starts, and runs with remedies, with the cost of each.""",
     intervals="feature_intervals.csv",
 )
 def table9_features(run: Run, intervals):
@@ -157,8 +154,7 @@ def table9_features(run: Run, intervals):
     SECTION,
     "What a cause is taken for",
     """What GP-CA, its classifier on both clouds, and the re-enactment without and with learning take a nominal
-    registration and each dominant cause for, pooled over sources, test samples and seeds, without borderline
-    registrations.""",
+    registration and each dominant cause for, pooled over sources and seeds, without borderline ones.""",
     metrics="causes.csv",
 )
 def cause_confusions(run: Run, metrics):

@@ -30,11 +30,7 @@ EXPERIMENT = Experiment(
 
 
 def collect_intervals(prediction_files: Paths) -> Frame:
-    """Accuracies of `metrics.csv` over all seeds, with 95 % intervals (:mod:`gpca.evaluation.measures`).
-
-    The accuracy is of all test samples and of each concept; an abstained sample is wrong. The draws of a source are the
-    same for all explainers that explain the same samples.
-    """
+    """Accuracies of `metrics.csv` over all seeds, with intervals; an abstained sample is wrong."""
     import pandas as pd
 
     def read(path: Path) -> Frame:
@@ -122,10 +118,11 @@ def table1_extended(run: Run, intervals, metrics):
 
     def more(row: Row, _subset: Frame) -> dict[str, Cell | None]:
         of_metric = where(metrics, {**row.where, "concept": ALL}).groupby("metric")["value"]
-        values = {metric: value_R.to_numpy() for metric, value_R in of_metric}
-        samples, factor = int(values["test_samples"].sum()), {"abstention_rate": 100}
+        values = {
+            metric: value_R.to_numpy() * (100 if metric == "abstention_rate" else 1) for metric, value_R in of_metric
+        }
         shown = [metric for metric in EXTENDED if metric in values and metric != "accuracy"]
-        return {metric: cell_of_repeats(values[metric] * factor.get(metric, 1), samples) for metric in shown}
+        return {metric: cell_of_repeats(values[metric], int(values["test_samples"].sum())) for metric in shown}
 
     rows = crossed(("source", run.source_titles), ("method", titles(run)))
     rows = with_label(rows, lambda row: entries[row.where["method"]].sight)

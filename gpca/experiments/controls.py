@@ -68,10 +68,7 @@ EXPERIMENT = Experiment(
 
 
 def _controls_of(plan: Plan, wildcards: Wildcards) -> tuple[list[str], list[str]]:
-    """Controls of a seed, and those for which it has encoders of its own.
-
-    Only the first seeds train encoders beyond those of every seed.
-    """
+    """Controls of a seed, and those for which it has encoders of its own, which only the first seeds train."""
     own = wildcards.source in plan.names["hard_source"]
     chosen = [name for name in plan.config["controls"]["controls"] if own or name != HARD]
     if int(wildcards.seed) not in plan.names["control_seed"][: plan.config["controls"]["encoder_seeds"]]:
@@ -81,9 +78,8 @@ def _controls_of(plan: Plan, wildcards: Wildcards) -> tuple[list[str], list[str]
 
 def _of_all_hard(plan: Plan, wildcards: Wildcards, file: str, read: str = "") -> list[str]:
     """Hard files of all sources, where the job has hard samples and, if given, an explainer that reads such files."""
-    entries = map(explainer_entry, plan.config["controls"]["explainers"])
-    is_read = not read or any(entry.reads == read for entry in entries)
-    is_asked = HARD in _controls_of(plan, wildcards)[0] and is_read
+    reads = ["", *(explainer_entry(name).reads for name in plan.config["controls"]["explainers"])]
+    is_asked = HARD in _controls_of(plan, wildcards)[0] and read in reads
     return [file.replace("{source}", "{*hard_source}")] if is_asked else []
 
 
@@ -181,12 +177,11 @@ def read_controls(files: Paths) -> Frame:
         _, trained_on, seed = source_method_seed(path)
         rows = read_predictions(path, samples.LABELS)
         frames.append(
-            rows[["control", "explainer", "sample", CALLS]].assign(
+            rows[["control", "explainer", CALLS]].assign(
                 source=rows["tested"],
                 trained_on=trained_on,
                 seed=seed,
                 cluster=rows["tested"] + "/" + rows["cluster"],
-                concept=rows["concept_true"],
                 right=(rows["concept_true"] == rows["concept_predicted"]) & ~rows["abstained"],
                 entropy=number_column(path, rows, "entropy"),
             )
@@ -203,10 +198,7 @@ def auroc_error(rows: Frame, weights_B_N: np.ndarray) -> np.ndarray:
 
 @numbers("controls.csv", rule="control_metrics", files="controls/{source}/seed{control_seed}.csv")
 def collect(run: Run, files: Paths) -> Frame:
-    """Accuracy, and AUROC of errors by entropy, by seed; ``table`` is the control.
-
-    ``concept`` is ``all``, and for transfer the source that was trained on.
-    """
+    """Accuracy, and AUROC of errors by entropy, by seed; the ``concept`` of transfer is the source trained on."""
     records: list[tuple] = []
     keys = ["control", "source", "trained_on", "explainer", "seed"]
     for (control, source, trained_on, explainer, seed), rows in read_controls(files).groupby(keys, sort=False):
@@ -225,10 +217,8 @@ Values = dict[str, np.ndarray]  # metric -> values (1 + B,)
 def collect_intervals(run: Run, files: Paths) -> Frame:
     """Accuracy and AUROC of every control and explainer over all seeds, with differences, by source and over all.
 
-    Of transfer there is a row for each source trained on, and one for all others together. Explainers and controls of a
-    source share the draws of families and seeds. Against ``usual``: the paper's protocol on the same seeds; ``rival``
-    and ``trivial``: the best other and the best trivial explainer under the same control. ICP calls are those under the
-    paper's protocol.
+    Of transfer there is a row for each source trained on, and one for all others together. Differences against
+    ``usual`` are from the paper's protocol on the same seeds and sources, which also has the ICP calls.
     """
     predictions = read_controls(files)
     sources = list(dict.fromkeys(predictions["source"]))
@@ -257,10 +247,7 @@ def collect_intervals(run: Run, files: Paths) -> Frame:
 
 
 def _values(rows: Frame, draws: Clustered) -> Values:
-    values = {
-        "accuracy": weighted_mean(rows["right"].to_numpy(), draws.weights),
-        AUROC: auroc_error(rows, draws.weights),
-    }
+    values = {"accuracy": weighted_mean(rows["right"], draws.weights), AUROC: auroc_error(rows, draws.weights)}
     if (rows["control"] == PAPER).all():
         values[CALLS] = np.full(len(draws.weights), rows[CALLS].mean())
     return values

@@ -61,10 +61,8 @@ def cause_costs(config: Mapping[str, Any], names: Iterable[str]) -> dict[str, di
     starts, descriptors = config["causes"]["starts"], DescriptorSettings(**config[NAME]["descriptors"])
     reenactment = ReenactmentSettings(**config[NAME]["reenactment"]).calls(starts)
     entries = {name: explainer_entry(name, CAUSES) for name in names}
-    return {
-        name: {"sees": entry.sight, "icp_calls": icp_calls(entry.sees, starts, descriptors, reenactment)}
-        for name, entry in entries.items()
-    }
+    calls = {name: icp_calls(entry.sees, starts, descriptors, reenactment) for name, entry in entries.items()}
+    return {name: {"sees": entry.sight, "icp_calls": calls[name]} for name, entry in entries.items()}
 
 
 EXPERIMENT = Experiment(
@@ -153,12 +151,11 @@ def collect(run: Run, prediction_files: Paths, causes_files: Paths) -> tuple[Fra
         rows = [(metric, ALL, value) for metric, value in values.items() if np.isfinite(value)]
         rows.append(("test_samples", ALL, len(samples)))
         if samples.names_causes:
-            labeled = samples.label != BORDERLINE
-            named = samples.named[labeled]
-            for true, counts in zip(LABELS, confusion(samples.label[labeled], named, named == "", LABELS), strict=True):
-                if counts.sum():
-                    predicted = zip((*LABELS, ABSTAINED), counts, strict=True)
-                    rows += [(PREDICTED_AS + label, true, count) for label, count in predicted]
+            labeled = samples.subset(samples.label != BORDERLINE)
+            counts_4_5 = confusion(labeled.label, labeled.named, labeled.named == "", LABELS)
+            for true, counts_5 in zip(LABELS, counts_4_5, strict=True):
+                predicted = zip((*LABELS, ABSTAINED), counts_5, strict=True)
+                rows += [(PREDICTED_AS + label, true, count) for label, count in predicted if counts_5.sum()]
         records += [(TABLE, source, explainer, metric, part, seed, float(value)) for metric, part, value in rows]
     against = AGAINST | {TRAINED: trained_rivals}
     return tidy(records, "diagnoses"), compared_by_source(by_source(judged), against=against)
@@ -176,24 +173,20 @@ def collect_by_features(run: Run, prediction_files: Paths, causes_files: Paths) 
 
 def with_pooled(judged: dict[tuple[str, str, int], Judged]) -> dict[tuple[str, str, int], Judged]:
     """Samples by source, explainer and seed, and those of all sources together where there are several."""
-    sources = dict.fromkeys(source for source, _, _ in judged)
-    if len(sources) < 2:
-        return judged
-    return judged | {
-        (POOLED, explainer, seed): joined(judged[source, explainer, seed] for source in sources)
-        for explainer, seed in dict.fromkeys((explainer, seed) for _, explainer, seed in judged)
-        if all((source, explainer, seed) in judged for source in sources)
-    }
+    sources, pooled = dict.fromkeys(source for source, _, _ in judged), {}
+    for explainer, seed in dict.fromkeys(key[1:] for key in judged) if len(sources) > 1 else ():
+        parts = [judged[source, explainer, seed] for source in sources if (source, explainer, seed) in judged]
+        if len(parts) == len(sources):
+            pooled[POOLED, explainer, seed] = joined(parts)
+    return judged | pooled
 
 
 def by_source(judged: Mapping[tuple[str, str, int], Judged]) -> dict[str, dict[str, Judged]]:
-    parts: dict[str, dict[str, list[Judged]]] = {}
-    for (source, explainer, _), samples in judged.items():
-        parts.setdefault(source, {}).setdefault(explainer, []).append(samples)
-    return {
-        source: {explainer: joined(seeds) for explainer, seeds in by_explainer.items()}
-        for source, by_explainer in parts.items()
-    }
+    found: dict[str, dict[str, Judged]] = {}
+    for source, explainer in dict.fromkeys(key[:2] for key in judged):
+        seeds = [samples for key, samples in judged.items() if key[:2] == (source, explainer)]
+        found.setdefault(source, {})[explainer] = joined(seeds)
+    return found
 
 
 # The ceiling is no rival, and none of it.
@@ -204,17 +197,14 @@ AGAINST: dict[str, Rivals] = {
 
 
 def compared_by_source(
-    samples_of: Mapping[str, Mapping[str, Judged]],
-    axis: str = "cause intervals",
-    metrics: Iterable[str] = tuple(MEASURES),
-    against: Mapping[str, Rivals] = AGAINST,
+    samples_of: Mapping[str, Mapping[str, Judged]], against: Mapping[str, Rivals] = AGAINST
 ) -> Frame:
     """Measures of every source and explainer with intervals over objects and seeds, and differences from rivals."""
     records: list[tuple] = []
     for source, by_explainer in samples_of.items():
         samples = next(iter(by_explainer.values()))
-        draws = Clustered.drawn(samples.seed, samples.instance, axis, source)
-        records += compared_samples(source, by_explainer, draws, measure, metrics, against=against)
+        draws = Clustered.drawn(samples.seed, samples.instance, "cause intervals", source)
+        records += compared_samples(source, by_explainer, draws, measure, MEASURES, against=against)
     return intervals(records, "diagnoses")
 
 
@@ -227,9 +217,9 @@ def compared_samples(
     part: str = ALL,
     against: Mapping[str, Rivals] = AGAINST,
 ) -> list[tuple]:
-    """Rows of :func:`gpca.evaluation.measures.compared`; the ``samples`` are those that a measure depends on.
+    """Rows of :func:`gpca.evaluation.measures.compared` for explainers of the same samples.
 
-    All explainers have the same samples; `measured` returns the measures of samples by weights of these.
+    `measured` returns the measures of samples by weights; the ``samples`` of a row are those that its measure counts.
     """
     samples = next(iter(samples_of.values()))
     values = {explainer: measured(each, draws.weights) for explainer, each in samples_of.items()}

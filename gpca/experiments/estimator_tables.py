@@ -50,9 +50,8 @@ def _count(values: Frame, metric: str) -> Cell | None:
 @table(
     SECTION,
     "Table XII: estimators of uncertainty",
-    """What each estimator says about the same registrations, judged by what it models. A reference is a set of further
-    registrations of the same situation: from other starts, as in the paper, of other data (the surfaces sampled again,
-    with other noise and outliers), or both.""",
+    """What each estimator says about the same registrations, judged by what it models: further registrations from other
+    starts, as in the paper, of other data (the surfaces sampled again, with other noise and outliers), or both.""",
     **INTERVALS,
 )
 def table12_uncertainty(run: Run, intervals):
@@ -144,13 +143,12 @@ def table12_failures(run: Run, intervals, seconds):
         methods[method] = f"{title}: {', '.join(states)}"
 
     def cells(row: Row, subset: Frame) -> dict[str, Cell | None]:
-        both, counted = rows_where(subset, state=estimators.BOTH), rows_where(subset, metric="no_estimate")
-        cells = {metric: _cell(both, metric) for metric in ("auroc_failed", "spearman_error")}
-        areas, spent = rows_where(both, metric="auroc_failed"), rows_where(seconds, **row.where)["seconds"]
-        if not len(areas):
+        cells = {metric: _cell(subset, metric) for metric in ("auroc_failed", "spearman_error")}  # of both states
+        if not len(areas := rows_where(subset, metric="auroc_failed")):
             return cells
+        counted, spent = rows_where(subset, metric="no_estimate"), rows_where(seconds, **row.where)["seconds"]
         cells["lead"] = interval_cell(areas.iloc[0], "difference", ("difference_low", "difference_high"), 1)
-        cells["samples"] = _count(both, "auroc_failed")
+        cells["samples"] = _count(subset, "auroc_failed")
         if total := int(counted["samples"].sum()):
             refused = sum(counted["value"] * counted["samples"])
             cells["no_estimate"] = plain_cell(100 * refused / total, int(counted["seeds"].iloc[0]), total)
@@ -166,8 +164,8 @@ def table12_failures(run: Run, intervals, seconds):
         "no_estimate": Column("None (%)", interval=False),
         "milliseconds": Column("ms", **RATIO),
     }
-    heads = {"method": "Registered by", "estimator": "Estimator"}
     rows = crossed(("method", methods), ("estimator", titles))
+    heads = {"method": "Registered by", "estimator": "Estimator"}
     sheet = Sheet("table12_failures", heads, rows, columns, intervals, more=cells)
     notes = (
         "Spread: root mean square distance by which the points of the object would move. Lead: AUROC minus that of "

@@ -10,6 +10,7 @@ from gpca.alignment.methods.registry import method_module, methods, require_loca
 from gpca.causes.judged import ranking
 from gpca.declarations import ByName, Experiment, Frame, LeftOut, Names, Paths, Plan, Run, Series, Step, numbers
 from gpca.errors import InputError, with_key
+from gpca.evaluation.intervals import best_of
 from gpca.evaluation.measures import Clustered, interval, source_method_seed, tidy
 from gpca.io import csv_file
 from gpca.settings import part_of
@@ -91,11 +92,7 @@ FILES = "estimates/{source}/{estimate}/seed{seed}.csv"
 
 @numbers("estimators.csv", rule="estimator_metrics", files=FILES)
 def collect_estimates(_run: Run, files: Paths) -> Frame:
-    """Metrics by source, estimator and seed; results/README.md lists them.
-
-    ``concept`` is the registration method and the state. A metric that is not defined, such as the area where all
-    registrations failed or none, has no row.
-    """
+    """Metrics by source, estimator and seed; results/README.md lists them. One that is not defined has no row."""
     records = []
     for (source, estimator, seed), rows in read_estimate_files(files).items():
         for method, of_method in rows.groupby("method", sort=False):
@@ -110,16 +107,14 @@ def collect_estimates(_run: Run, files: Paths) -> Frame:
 
 @numbers("estimator_intervals.csv", files=FILES)
 def collect_intervals(_run: Run, files: Paths) -> Frame:
-    """Metrics over all sources and seeds, with the 95 % interval of a bootstrap over families and seeds (`COLUMNS`).
-
-    Of the area under the ROC curve, the rival is the best gate on the same registrations, and the difference from it
-    is that of the same draws.
-    """
+    """Metrics over all sources and seeds with intervals; of the area, the difference from the best gate (rival)."""
     import pandas as pd
 
-    keys, records = ("source", "estimator", "seed"), []
-    parts = [rows.assign(**dict(zip(keys, of, strict=True))) for of, rows in read_estimate_files(files).items()]
-    together = pd.concat(parts, ignore_index=True)
+    together = pd.concat(
+        rows.assign(source=source, estimator=estimator, seed=seed)
+        for (source, estimator, seed), rows in read_estimate_files(files).items()
+    )
+    records = []
     for method, trials in together.groupby("method", sort=False):
         by_estimator = trials.groupby("estimator", sort=False)
         records += _compare(str(method), {str(name): rows.reset_index(drop=True) for name, rows in by_estimator})
@@ -132,10 +127,13 @@ def _compare(method: str, rows_of: Mapping[str, Frame]) -> list[tuple]:
     cluster_N = (known["source"] + "/" + known["cluster"]).to_numpy()
     draws = Clustered.drawn(known["seed"], cluster_N, "estimator intervals", method)
     matched = known["fitness"] > 0  # without correspondences, a gate's score is the largest
-    scores = {"gate_rmse": known["inlier_rmse"], "gate_fitness": -known["fitness"]}
-    gates = {name: known.assign(failure="", spread=score.where(matched, np.inf)) for name, score in scores.items()}
-    rivals = gates | ({SPREAD_GATE: rows_of[SPREAD_GATE]} if SPREAD_GATE in rows_of else {})
-    records = []
+    gates = {
+        name: known.assign(failure="", spread=score.where(matched, np.inf))
+        for name, score in (("gate_rmse", known["inlier_rmse"]), ("gate_fitness", -known["fitness"]))
+    }
+    rivals = gates | {name: rows for name, rows in rows_of.items() if name == SPREAD_GATE}
+    scores = {name: rows["spread"].fillna(np.inf).to_numpy() for name, rows in rivals.items()}
+    failed_N, records = known["failed"].to_numpy(), []
     for state, chosen_N in of_state(known).items():
         for name, rows in {**rows_of, **gates}.items():
             has_N = chosen_N & (rows["failure"] == "").to_numpy()
@@ -145,12 +143,12 @@ def _compare(method: str, rows_of: Mapping[str, Frame]) -> list[tuple]:
                     continue
                 lead = ("", np.nan, np.nan, np.nan)
                 if metric == "auroc_failed":
-                    score_of = {gate: each["spread"].fillna(np.inf).to_numpy() for gate, each in rivals.items()}
-                    weights_B_N, failed_N = draws.weights * has_N, known["failed"].to_numpy()
                     areas = {
-                        gate: ranking(score_N, failed_N, weights_B_N)["area"] for gate, score_N in score_of.items()
+                        gate: ranking(score_N, failed_N, draws.weights * has_N)["area"]
+                        for gate, score_N in scores.items()
+                        if gate != name
                     }
-                    best = max((gate for gate in areas if gate != name), key=lambda gate: areas[gate][0])
+                    best = best_of(areas, areas)
                     lead = best, *interval(value_B - areas[best])
                 enough = len(set(cluster_N[has_N])) >= FEWEST_FAMILIES
                 drawn_B_n = draws.weights[1:, has_N] if metric.startswith("coverage_") else None
@@ -167,12 +165,8 @@ def of_state(rows: Frame) -> dict[str, np.ndarray]:
 
 
 def measure(rows: Frame, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
-    """Metrics (B,) of registrations by their weights (B, N); NaN where one is not defined.
+    """Metrics (B,) of registrations by their weights (B, N), as results/README.md lists them; NaN where undefined.
 
-    Of each kind of reference, and of the true pose (`truth`) but for the divergences: kl_rotation and kl_translation,
-    nats, of the estimate from the reference; nne, √ of |e|² / tr Σ, and nees, eᵀΣ⁻¹e / 6, of which 1 is right and more
-    is too sure; coverage, the share of the results, or of the true poses, within the 95 % region of Σ. All but the
-    last are trimmed means. no_estimate is the share that it refused or failed at, which the others leave out;
     spearman_error is unweighted.
     """
     from scipy.stats import chi2, spearmanr
@@ -185,13 +179,12 @@ def measure(rows: Frame, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
         return metrics
     rows, weights_B_N = rows[has_N], weights_B_N[:, has_N]
     for kind in (*KINDS, TRUTH):
-        of = {name: rows[name if kind == TRUTH else f"{name}_{kind}"] for name in ("error_ratio", "mahalanobis")}
-        if kind != TRUTH:
-            for name in ("kl_rotation", "kl_translation"):
-                metrics[f"{name}_{kind}"] = trimmed_mean(rows[f"{name}_{kind}"], weights_B_N)
-        metrics[f"nne_{kind}"] = np.sqrt(trimmed_mean(of["error_ratio"], weights_B_N))
-        metrics[f"nees_{kind}"] = trimmed_mean(of["mahalanobis"], weights_B_N) / 6
-        within = of["mahalanobis"] <= chi2.ppf(LEVEL, 6) if kind == TRUTH else rows[f"covered_{kind}"]
+        suffix = "" if kind == TRUTH else f"_{kind}"
+        for name in () if kind == TRUTH else (f"kl_rotation_{kind}", f"kl_translation_{kind}"):
+            metrics[name] = trimmed_mean(rows[name], weights_B_N)
+        metrics[f"nne_{kind}"] = np.sqrt(trimmed_mean(rows["error_ratio" + suffix], weights_B_N))
+        metrics[f"nees_{kind}"] = trimmed_mean(rows["mahalanobis" + suffix], weights_B_N) / 6
+        within = rows["mahalanobis"] <= chi2.ppf(LEVEL, 6) if kind == TRUTH else rows[f"covered_{kind}"]
         metrics[f"coverage_{kind}"] = trimmed_mean(within.astype(float), weights_B_N, trimmed=0)
     spread_N, error_N = rows["spread"].to_numpy(), rows["add_relative"].to_numpy()
     metrics["auroc_failed"] = ranking(spread_N, rows["failed"].to_numpy(), weights_B_N)["area"]
@@ -223,10 +216,7 @@ def read_intervals(path: str | Path) -> Frame:
 
 
 def collect_estimate_seconds(files: Paths) -> Frame:
-    """Estimator, method and the median seconds of files ``…/{source}/estimator_{name}/seed{seed}.csv``.
-
-    Apart from the metrics, because times differ from run to run and metrics must not.
-    """
+    """Estimator, method and the median seconds of files ``…/{source}/estimator_{name}/seed{seed}.csv``."""
     import pandas as pd
 
     parts = []
