@@ -74,18 +74,15 @@ def test_modules_do_not_import_in_a_circle():
     assert set(TopologicalSorter(graph).static_order()) >= set(names)  # a circle raises a CycleError that lists it
 
 
-def test_few_modules_are_at_the_top():
+def test_few_modules_are_at_the_top_and_no_file_of_tests_is_too_long():
     assert len([path for path in (ROOT / "gpca").glob("*.py") if not path.stem.startswith("__")]) <= MOST_AT_THE_TOP
+    lines = {path.relative_to(ROOT): len(path.read_text().splitlines()) for path in (ROOT / "tests").rglob("*.py")}
+    assert [str(path) for path, count in lines.items() if count > LONGEST] == []
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_no_module_is_too_long_to_be_read_at_once(path):
     assert len(path.read_text().splitlines()) <= LONGEST
-
-
-def test_no_file_of_tests_is_too_long_either():
-    lines = {path.relative_to(ROOT): len(path.read_text().splitlines()) for path in (ROOT / "tests").rglob("*.py")}
-    assert [str(path) for path, count in lines.items() if count > LONGEST] == []
 
 
 def test_every_step_and_rule_file_has_its_stage():

@@ -30,7 +30,7 @@ def run_folder(smoke_plan, tmp_path):
     return folder
 
 
-def test_wall_time_keeps_order_cores_and_priority():
+def test_wall_time_keeps_order_cores_and_priority_and_the_critical_path_is_the_longest_chain():
     seconds = dict.fromkeys((f"benchmarks/{name}.tsv" for name in "abcd"), 10.0) | {"benchmarks/a.tsv": 25.0}
     chain = [job("a"), job("b", "a"), job("c", "b")]
     assert wall_time(chain, seconds, cores=2) == 45
@@ -41,9 +41,6 @@ def test_wall_time_keeps_order_cores_and_priority():
     assert wall_time(late, seconds, cores=2) == 35  # a waits until b or c ends
     assert wall_time([job("a", threads=2), job("b")], seconds, cores=2) == 35
     assert wall_time([job("a", threads=8)], seconds, cores=2) == 25
-
-
-def test_the_critical_path_is_the_longest_chain_in_seconds():
     seconds = {f"benchmarks/{name}.tsv": value for name, value in {"a": 5, "b": 9, "c": 1, "d": 2, "e": 3}.items()}
     jobs = [job("e", "c", "d"), job("c", "a"), job("d", "b"), job("b"), job("a", "from_outside")]
     assert [each.outputs[0] for each in critical_path(jobs, seconds)] == ["b", "d", "e"]

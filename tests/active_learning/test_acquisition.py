@@ -123,14 +123,11 @@ def test_a_crowd_of_uncertain_samples_gets_as_many_labels_as_it_has_shares_of_th
     assert ((rows < 12).sum(), uncertain[rows].sum()) == (3, 4)
 
 
-def test_bald_kmeans_names_the_most_uncertain_of_its_choice_first():
+def test_bald_kmeans_names_the_most_uncertain_first_and_bald_stochastic_draws_in_proportion():
     pool = make_pool()
     rows = acquisition.bald_kmeans(pool, 4, np.random.default_rng(0))
     assert (np.diff(pool.bald_N[rows]) <= 0).all()
     assert set(rows) <= set(acquisition.top(pool.bald_N, 4 * acquisition.EXPANSION))
-
-
-def test_bald_stochastic_draws_in_proportion_to_bald():
     pool, random = make_pool(5, bald_N=np.array([0.0, 0.1, 0.2, 0.3, 0.4])), np.random.default_rng(0)
     draws = [acquisition.STRATEGIES["bald_stochastic"].choose(pool, 5, random).tolist() for _ in range(2000)]
     assert {rows[-1] for rows in draws} == {0}

@@ -19,9 +19,15 @@ def repeated(function, *arrays):
     return [function(*(np.repeat(array, of_draw.astype(int), axis=0) for array in arrays)) for of_draw in WEIGHTS]
 
 
-def test_calibration_errors_are_those_of_repeated_samples():
+def test_calibration_errors_are_those_of_repeated_samples_and_alike_ones_have_no_order():
     expected = repeated(diagnostics.calibration_error, P, TARGET)
     assert diagnostics.calibration_error(P, TARGET, WEIGHTS) == pytest.approx(expected)
+    weights = np.zeros((2, S))
+    weights[0, :2] = 3
+    one = np.append([0.1, 0.1], np.arange(S - 2))
+    assert diagnostics.rank_correlation(one, OTHER, weights)[0] == 0
+    assert np.isnan(diagnostics.aurc(one, WRONG, weights)[1])
+    assert np.isnan(diagnostics.calibration_error(P, TARGET, weights)[1])
 
 
 @pytest.mark.parametrize("name", ["aurc", "excess_aurc", "augrc"])
@@ -35,12 +41,3 @@ def test_areas_are_those_of_repeated_samples(name, confidence):
 def test_rank_correlations_are_those_of_repeated_samples(one):
     expected = repeated(diagnostics.rank_correlation, one, OTHER)
     assert diagnostics.rank_correlation(one, OTHER, WEIGHTS) == pytest.approx(expected)
-
-
-def test_a_draw_of_alike_samples_has_no_order_and_one_without_any_no_value():
-    weights = np.zeros((2, S))
-    weights[0, :2] = 3
-    one = np.append([0.1, 0.1], np.arange(S - 2))
-    assert diagnostics.rank_correlation(one, OTHER, weights)[0] == 0
-    assert np.isnan(diagnostics.aurc(one, WRONG, weights)[1])
-    assert np.isnan(diagnostics.calibration_error(P, TARGET, weights)[1])

@@ -248,9 +248,8 @@ def test_calibration_comes_from_predictions(tmp_path):
 
 
 def test_verdicts_are_written_and_read(tmp_path):
-    rows = judge(
-        [CLAIM, Claim("open", "s", "p", note="nobody ran it")], {"metrics.csv": pd.concat(rows_of(2, 3))}, OBJECTS
-    )
+    claims = [CLAIM, Claim("open", "s", "p", note="nobody ran it")]
+    rows = judge(claims, {"metrics.csv": pd.concat(rows_of(2, 3))}, OBJECTS)
     path = tmp_path / "claims.csv"
     rows.to_csv(path, index=False)
     read = read_verdicts(path)

@@ -49,25 +49,16 @@ def test_the_rule_in_percentage_points(verdict, found):
 
 
 def test_a_printed_range_is_a_band():
-    for value, verdict in {
-        84.96: "reproduced",
-        92.9: "reproduced",
-        95: "close",
-        95.1: "not reproduced",
-        83: "close",
-    }.items():
+    edges = {84.96: "reproduced", 92.9: "reproduced", 95: "close", 95.1: "not reproduced", 83: "close"}
+    for value, verdict in edges.items():
         assert verdicts.verdict_of(printed(86.0, upper=92.0), Reproduced(value, value, value, 5), POINTS) == verdict
 
 
 def test_the_papers_own_error_adds_to_that_of_the_run_whose_wider_interval_counts():
     found = Reproduced(94.0, 92.8, 95.2, 5)  # 4 points above, less half a digit
     assert verdicts.verdict_of(printed(90.0), found, POINTS) == "not reproduced"
-    assert (
-        verdicts.verdict_of(printed(90.0, low=88.0, high=92.0), found, POINTS) == "not reproduced"
-    )  # 1.2 and 2 make 2.3
-    assert (
-        verdicts.verdict_of(printed(90.0, low=87.0, high=93.0), found, POINTS) == "inconclusive"
-    )  # 1.2 and 3 make 3.2
+    for own, verdict in ((2, "not reproduced"), (3, "inconclusive")):  # 1.2 and 2 make 2.3, 1.2 and 3 make 3.2
+        assert verdicts.verdict_of(printed(90.0, low=90.0 - own, high=90.0 + own), found, POINTS) == verdict
     near = Reproduced(92.2, 91.0, 93.4, 5)
     assert verdicts.verdict_of(printed(90.0), near, POINTS) == "close"
     assert verdicts.verdict_of(printed(90.0, low=88.0, high=92.0), near, POINTS) == "reproduced"
@@ -213,10 +204,7 @@ def test_the_page_counts_first_and_gives_each_reason_once():
     assert re.findall(r"\d+", second) == ["4", "4", "4", "1", "3"]  # numbers, means, decided, as which
     assert "| YCB | GP-CA | % | 90.0 | 90.0 (90.0 to 90.0) | – | 2 | – | +0.0 | **reproduced** |" in page
     assert "| LINEMOD | GP-CA | % | 97.0 | 90.0 (90.0 to 90.0) | – | 2 | – | -7.0 | not reproduced [1] |" in page
-    time = (
-        "| ICP alignment | Time | s | 1 to 2 | 0.004 (0.0039 to 0.0041) | – | 100 | – | × 0.004 | not reproduced [1] |"
-    )
-    assert time in page
+    assert "| ICP alignment | Time | s | 1 to 2 | 0.004 (0.0039 to 0.0041) | – | 100 | – | × 0.004 | not rep" in page
     assert "| All, by intervals over objects too | 1 |  |  | 3 |" in page
     assert page.count("1. Other | data.") == 2
     assert "| Table I: Single-concept attribution | 1 |  |  | 2 |  |  | 1.0 | 1.00 | – |\n" in page
@@ -263,9 +251,8 @@ def test_a_reason_is_filled_with_what_was_run_in_the_unit_that_it_names():
     text = "It is {metrics.csv attribution @ gpca accuracy all %} %. The paper is silent."
     assert verdicts.filled(text, number(50.0), {"metrics.csv": tidy([0.1])}) == "The paper is silent."
     assert verdicts.filled(text, number(50.0), {}) == "The paper is silent."
-    rows = [
-        tidy([value], metric=metric, concept="overlap") for metric, value in (("labels_to_target", 60), ("reached", 0))
-    ]
+    values = {"labels_to_target": [60], "reached": [0]}
+    rows = [tidy(value, metric=metric, concept="overlap") for metric, value in values.items()]
     text = "It takes {a.csv attribution @ @ labels_to_target overlap labels} labels."
     assert verdicts.filled(text, number(50.0), {"a.csv": pd.concat(rows)}) == "It takes more than 60 labels."
 

@@ -175,10 +175,7 @@ def test_the_command_lists_all_faults_with_their_files(tmp_path, capsys):
 FAULTS_OF_STAND_INS = [
     ({"sources": {"ycb": {"family": "ycbb"}}}, "sources.ycb: family 'ycbb': no such procedural family; choose one "),
     ({"sources": {"ycb": {"family": ""}}}, "sources.ycb: source 'YCB': names no family"),
-    (
-        {"real_world": {"initial_pose": {"form": "results"}}},
-        "real_world.initial_pose: form 'results' needs a dataset with result",
-    ),
+    ({"real_world": {"initial_pose": {"form": "results"}}}, "real_world.initial_pose: form 'results' needs a dataset"),
 ]
 
 
@@ -206,13 +203,9 @@ def given(**values):
 
 
 def test_values_of_the_command_line_have_the_types_of_a_config_file_or_are_refused_in_one_line():
-    config = given(
-        seeds=["0", "3"],
-        registrations={"train": "36", "severities": {"noise": ["0.01", "0.02"]}},
-        sources={"linemod": "false"},
-        data_dir="null",
-        run="mine",
-    )
+    registrations = {"train": "36", "severities": {"noise": ["0.01", "0.02"]}}
+    values = {"seeds": ["0", "3"], "registrations": registrations, "sources": {"linemod": "false"}}
+    config = given(**values, data_dir="null", run="mine")
     assert config["seeds"] == [0, 3]
     assert config["registrations"]["train"] == 36
     assert config["registrations"]["severities"]["noise"] == [0.01, 0.02]

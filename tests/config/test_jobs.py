@@ -90,13 +90,8 @@ clear_leftovers()
 print("lives", flush=True)
 sys.stdin.read()
 """
-LEFT = (
-    "locks/0.input.lock",
-    "locks/0.output.lock",
-    "scripts/tmp0abc_1.table.py",
-    "shadow/tmp123/x",
-    "shell_tmp.ab/script.sh",
-)
+LEFT = ("locks/0.input.lock", "locks/0.output.lock")
+LEFT += ("scripts/tmp0abc_1.table.py", "shadow/tmp123/x", "shell_tmp.ab/script.sh")
 KEPT = ("incomplete/cmVzdWx0", "metadata/cmVzdWx0", "log/one.log", "auxiliary/x")
 
 

@@ -22,14 +22,11 @@ def test_the_bound_is_the_value_of_the_rank_that_split_conformal_prediction_name
     assert upper_bound(values, level) == np.quantile(values, corrected - 1e-12, method="inverted_cdf")
 
 
-def test_too_few_samples_or_families_bound_nothing():
+def test_the_bound_holds_exactly_as_often_as_promised_and_too_few_samples_bound_nothing():
     assert upper_bound(np.arange(8.0), 0.9) == inf and upper_bound(np.arange(9.0), 0.9) == 8
     families = np.repeat(np.arange(8), 50)
     assert upper_bound(np.arange(400.0), 0.9, families) == inf and upper_bound(np.empty(0), 0.5) == inf
     assert conformal.highest_level(families) == pytest.approx(8 / 9)
-
-
-def test_the_bound_holds_exactly_as_often_as_promised():
     random = np.random.default_rng(1)
     drawn = random.random((DRAWS, 40))
     held = np.mean([row[-1] <= upper_bound(row[:-1], 0.9) for row in drawn])

@@ -49,7 +49,7 @@ def test_bounds_are_the_quantiles_of_the_draws_that_have_a_value():
     assert np.isnan(interval(np.full(4, np.nan), np.ones((3, 2)))).all()
 
 
-def test_a_share_on_which_all_draws_agree_has_wilsons_interval_of_its_clusters():
+def test_a_share_has_wilsons_interval_where_all_draws_agree_and_is_never_surer_than_that():
     weights = draws("tiny")
     assert intervals.independent(weights) == 2 * 3  # an object counts once in each seed, with two samples of each
     assert intervals.independent(weights[:, OBJECT == "cup"]) == 2
@@ -58,10 +58,6 @@ def test_a_share_on_which_all_draws_agree_has_wilsons_interval_of_its_clusters()
     assert bounds(ones, weights) == wilson_interval(6, 6)
     assert bounds(0 * ones, weights) == wilson_interval(0, 6)
     assert bounds(0.5 * ones, weights) == wilson_interval(3, 6)
-
-
-def test_a_share_is_never_surer_than_as_many_independent_samples():
-    weights = draws("tiny")
     narrow, wide = np.linspace(0.7, 0.8, len(weights)), np.linspace(0, 1, len(weights))
     assert interval(np.append(0.75, narrow), weights) == (0.75, *wilson_interval(9, 12))
     assert bounds(wide, weights) == quantile_bounds(wide)

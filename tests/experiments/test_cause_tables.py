@@ -33,9 +33,8 @@ def rows(source, method, rival, **values):
         keys, counts = ("causes", source, method, metric, "all"), (5, 20, samples.get(metric, 250))
         records.append((*keys, "", "", *counts, value, value - 0.1, value + 0.05))
         if rival:
-            records += [
-                (*keys, kind, other, *counts, *APART) for kind, other in (("rival", rival), ("trivial", "rule"))
-            ]
+            others = {"rival": rival, "trivial": "rule"}
+            records += [(*keys, kind, other, *counts, *APART) for kind, other in others.items()]
     return records
 
 
@@ -97,10 +96,7 @@ def test_how_near_to_chance_the_rule_is_among_the_failed_is_said(intervals, titl
         both = pd.concat([intervals, pd.DataFrame(of_rule, columns=COLUMNS)])
         return table9_causes(both).markdown()
 
-    assert "right in 36.0 % (26.0 to 41.0), which is +2.7 points from chance; the interval ends within 10" in text_of(
-        0.36
-    )
-    assert "right in 40.0 % (30.0 to 45.0), which is +6.7 points from chance; the interval reaches beyond" in text_of(
-        0.4
-    )
-    assert "| Dominant (%), chance 33.3 |" in text_of(0.36) and "| 36.0 (26.0 to 41.0) |" in text_of(0.36)
+    near, beyond = text_of(0.36), text_of(0.4)
+    assert "right in 36.0 % (26.0 to 41.0), which is +2.7 points from chance; the interval ends within 10" in near
+    assert "right in 40.0 % (30.0 to 45.0), which is +6.7 points from chance; the interval reaches beyond" in beyond
+    assert "| Dominant (%), chance 33.3 |" in near and "| 36.0 (26.0 to 41.0) |" in near

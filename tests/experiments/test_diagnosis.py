@@ -74,7 +74,7 @@ def test_predictions_without_their_truth_or_of_other_samples_are_refused(causes,
         by_seed([], [])
 
 
-def test_of_two_explainers_the_better_leads_by_what_the_other_lacks():
+def test_a_lead_is_over_the_better_rival_and_a_gain_over_the_best_that_needs_no_training():
     good, poor = random_judged(200, skill=2.0), random_judged(200, skill=0.3)
     rows = compared(good=good, poor=poor, **{CEILING: good})
     own, lead = rows.loc["good", ""], rows.loc["good", "rival"]
@@ -84,9 +84,6 @@ def test_of_two_explainers_the_better_leads_by_what_the_other_lacks():
     assert rows.loc["poor", "rival"]["value"] == pytest.approx(-lead["value"])
     assert rows.loc[CEILING].index.tolist() == [""]
     assert own["samples"] == (good.label != BORDERLINE).sum() < len(good)
-
-
-def test_the_gain_is_over_the_best_that_needs_no_training():
     good, poor, guess = (random_judged(200, skill=skill) for skill in (2.0, 0.3, 0.0))
     rows = compared(good=good, rule=poor, chance=guess, **{CEILING: good})
     gain = rows.loc["good", "trivial"]
@@ -100,9 +97,8 @@ def test_the_gain_is_over_the_best_that_needs_no_training():
 def test_a_lead_is_over_the_best_that_is_trained_and_reads_no_reenactment():
     skills = {"reenact": 0.2, "reenact_committee": 2.0, "pair_forest": 0.1, "committee_further": 0.5, "rule": 0.0}
     judged = {name: random_judged(200, skill=skill) for name, skill in skills.items()}
-    rows = diagnosis.compared_by_source(
-        {"tiny": judged | {CEILING: judged["rule"]}}, against={"trained": trained_rivals}
-    )
+    samples = {"tiny": judged | {CEILING: judged["rule"]}}
+    rows = diagnosis.compared_by_source(samples, against={"trained": trained_rivals})
     rows = rows[rows["metric"] == "balanced_accuracy"].set_index(["method", "against"])
     assert rows.loc["reenact", "trained"]["other"] == "committee_further"
     assert rows.loc["reenact", "trained"]["value"] < 0 < rows.loc["reenact_committee", "trained"]["value"]
@@ -149,12 +145,8 @@ def test_strata_are_written_read_and_tabled(run, causes, tmp_path):
     assert (right["value"] == 1).all() and {"state_failed", "state_nominal"} <= set(right["concept"])
     assert {"margin", "causes"} <= set(right["concept"].str.split("_").str[0])
     table = table9_strata(RUN, strata)
-    assert list(table.columns)[1:] == [
-        "right_named_right",
-        "right_regret",
-        f"{CEILING}_named_right",
-        f"{CEILING}_regret",
-    ]
+    kinds = ("named_right", "regret")
+    assert list(table.columns)[1:] == [f"{name}_{kind}" for name in ("right", CEILING) for kind in kinds]
     tested = causes.truth.state[causes.rows("test")]
     rows = {tuple(key for key, _ in labels): row for row, labels in enumerate(table.rows)}
     assert table.cells[rows["state", "nominal"], "samples"].mean == (tested == NOMINAL).sum()

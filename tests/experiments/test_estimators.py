@@ -131,16 +131,16 @@ def intervals_of(file, **of_estimators):
 
 
 def test_intervals_are_over_all_sources_and_seeds(file, tmp_path):
-    found = intervals_of(file, brossard=rows(mahalanobis=np.where(np.arange(20) % 3, 1.0, 100.0)))
-    write_csv(tmp_path / "intervals.csv", found)
+    of_brossard = rows(mahalanobis=np.where(np.arange(20) % 3, 1.0, 100.0))
+    collected = intervals_of(file, brossard=of_brossard)
+    write_csv(tmp_path / "intervals.csv", collected)
     found = read_intervals(tmp_path / "intervals.csv")
     of = found[found["estimator"] == "brossard"].set_index(["state", "metric"])
     row = of.loc["succeeded", f"coverage_{TRUTH}"]
     assert (row["samples"], row["seeds"], row["value"]) == (40, 2, pytest.approx(0.6))
     assert row["low"] < 0.6 < row["high"]
     assert of.loc[("failed", "no_estimate"), "value"] == 0
-    again = intervals_of(file, brossard=rows(mahalanobis=np.where(np.arange(20) % 3, 1.0, 100.0)))
-    assert again.equals(intervals_of(file, brossard=rows(mahalanobis=np.where(np.arange(20) % 3, 1.0, 100.0))))
+    assert intervals_of(file, brossard=of_brossard).equals(collected)
 
 
 def test_an_area_is_compared_with_the_best_gate_on_the_same_draws(file):
@@ -148,9 +148,8 @@ def test_an_area_is_compared_with_the_best_gate_on_the_same_draws(file):
     spread = {"brossard": np.ones(20), "monte_carlo": np.where(np.arange(20) >= 15, 1.0, 0.5)}
     found = intervals_of(file, **{name: rows(spread=values) for name, values in spread.items()})
     of = found[found["metric"] == "auroc_failed"].set_index("estimator")
-    assert of["value"].to_dict() == pytest.approx(
-        {REFERENCES[0]: 1, "brossard": 0.5, "monte_carlo": 0.75, "gate_rmse": 1, "gate_fitness": 0.5}
-    )
+    expected = {REFERENCES[0]: 1, "brossard": 0.5, "monte_carlo": 0.75, "gate_rmse": 1, "gate_fitness": 0.5}
+    assert of["value"].to_dict() == pytest.approx(expected)
     assert of.loc["brossard", ["rival", "difference", "difference_high"]].tolist() == ["gate_rmse", -0.5, -0.5]
     assert of.loc["gate_rmse", ["rival", "difference"]].tolist() == ["monte_carlo", 0.25]
     assert set(found[found["estimator"] == "gate_rmse"]["metric"]) == {"auroc_failed", "spearman_error"}
@@ -158,9 +157,8 @@ def test_an_area_is_compared_with_the_best_gate_on_the_same_draws(file):
 
 def test_a_registration_without_correspondences_scores_worst_and_few_families_have_no_interval(file):
     lost = rows(fitness=np.where(np.arange(20) == 19, 0.0, 0.9), inlier_rmse=np.where(np.arange(20) == 19, 0.0, 0.01))
-    of = estimators.collect_intervals(RUN, [file(lost, f"ycb/{REFERENCES[0]}/seed0.csv")]).set_index(
-        ["estimator", "metric"]
-    )
+    found = estimators.collect_intervals(RUN, [file(lost, f"ycb/{REFERENCES[0]}/seed0.csv")])
+    of = found.set_index(["estimator", "metric"])
     assert of.loc[("gate_rmse", "auroc_failed"), "value"] == pytest.approx(0.55)
     found = intervals_of(file, brossard=rows(cluster="cups"), **{REFERENCES[0]: rows(cluster="cups")})
     assert found["low"].isna().all()

@@ -85,10 +85,8 @@ def test_accuracies_and_differences_have_their_interval_over_scenes_and_the_devi
     assert cells[2, "parameters"].mean == 150
     assert (3, "parameters") not in cells
     assert table.best() == {(1, "accuracy")}
-    assert (
-        "Over 3 seeds, 300 test samples each; in brackets: the 95 % interval of a bootstrap over scenes"
-        in (table.footnotes[0])
-    )
+    note = "Over 3 seeds, 300 test samples each; in brackets: the 95 % interval of a bootstrap over scenes"
+    assert note in table.footnotes[0]
 
 
 def test_untrained_explainers_and_published_encoders_stand_below_and_are_never_the_best():
@@ -155,8 +153,7 @@ def test_rows_are_conditions_by_methods_and_columns_what_was_seen():
 def test_the_note_says_that_the_pretraining_knows_the_models():
     values = {("real_rgbd", "attribution", "dgcnn-none"): (0.7, 100, 1)}
     assert "renders the models" not in " ".join(make_seen(values).footnotes)
-    assert "The pretraining renders the models of both." in " ".join(
-        make_seen(values, virtual={"objects": "all"}).footnotes
-    )
+    notes = make_seen(values, virtual={"objects": "all"}).footnotes
+    assert "The pretraining renders the models of both." in " ".join(notes)
     with pytest.raises(InputError, match="has nothing to show"):
         make_seen({("real_rgbd", "attribution", "other"): (0.7, 100, 1)})

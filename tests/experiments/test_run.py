@@ -27,16 +27,11 @@ def sources(config):
     return check(deepcopy(config))
 
 
-def test_every_place_that_the_registry_names_is_there(config, sources):
-    names = names_of(config, sources)
-    for result in results_of(names):
-        assert all(files for files in result.files(names).values())
-
-
-def test_a_reader_of_one_file_is_given_one_and_a_reader_of_many_a_list(config, sources):
+def test_every_place_that_the_registry_names_is_there_and_only_readers_of_many_files_are_given_a_list(config, sources):
     names = names_of(config, sources)
     for result in results_of(names):
         files = result.files(names)
+        assert all(files.values())
         for given in result.inputs:
             if given.read:
                 taken = next(iter(inspect.signature(load_function(given.read)).parameters.values()))

@@ -21,16 +21,13 @@ from .tiny import read
 TABLE = "test/000001"  # the scene, below the folder of the dataset
 
 
-def test_a_pixel_is_projected_back_by_hand():
+def test_pixels_are_projected_back_but_for_what_lies_a_diameter_behind_the_object(tmp_path):
     depth_m = np.zeros((4, 5), np.float32)
     depth_m[1, 3] = 2.0
     camera_3_3 = np.array([[10.0, 0, 2], [0, 20, 3], [0, 0, 1]])
     points, pixels = bop.back_project(depth_m, np.ones((4, 5), bool), camera_3_3)
     assert points.tolist() == [[(3 - 2) / 10 * 2, (1 - 3) / 20 * 2, 2.0]]
     assert pixels.tolist() == [[3, 1]]
-
-
-def test_what_lies_a_diameter_behind_the_object_is_not_of_it(tmp_path):
     save(tmp_path / "mask.png", np.full((20, 20), 255, np.uint8))
     frame = bop.Frame(0, 0, np.array([[100.0, 0, 10], [0, 100, 10], [0, 0, 1]]), 1.0, None, None, ())
     depth_m = np.full((20, 20), 1.0, np.float32)

@@ -51,12 +51,19 @@ def test_points_lie_on_the_surface_and_two_views_are_fused_in_one_frame():
     assert shots[0].object_points_m(2 * D)[:, 0].min() > -0.05  # one view has no far side
 
 
-def test_what_is_farther_than_a_diameter_from_the_median_is_left_out():
+def test_what_is_farther_than_a_diameter_and_outliers_go_and_the_surface_stays():
     shot = seen((0.6, 0, 0.2))
     depth_m = shot.depth_m.copy()
     v, u = np.argwhere(shot.mask)[0]
     depth_m[v, u] += 0.7
     assert len(Shot(CAMERA, shot.T_world_camera, depth_m, shot.mask).object_points_m(2 * D)) == shot.mask.sum() - 1
+    depth_m = shot.depth_m.copy()
+    v, u = np.argwhere(shot.mask)[:2].T
+    depth_m[v, u] -= 0.25
+    points = fuse([shot], 2 * D, filtered=False)
+    kept = fuse([Shot(shot.camera, shot.T_world_camera, depth_m, shot.mask)], 2 * D, filtered=True)
+    assert np.linalg.norm(kept, axis=1).max() < 0.11
+    assert len(kept) > 0.9 * len(points)
 
 
 def test_projection_is_the_inverse_of_back_projection():
@@ -75,17 +82,6 @@ def test_the_median_ignores_what_was_not_measured():
     frames[:, 0, 2] = (0, 0, 3, 5)
     frames[:, 0, 3] = (0, 0, 0, 5)
     assert median_depth(frames)[0].tolist() == [2.5, 3, 4, 0, 0]
-
-
-def test_outliers_go_and_the_surface_stays():
-    shot = seen((0.6, 0, 0.2))
-    depth_m = shot.depth_m.copy()
-    v, u = np.argwhere(shot.mask)[:2].T
-    depth_m[v, u] -= 0.25
-    points = fuse([shot], 2 * D, filtered=False)
-    kept = fuse([Shot(shot.camera, shot.T_world_camera, depth_m, shot.mask)], 2 * D, filtered=True)
-    assert np.linalg.norm(kept, axis=1).max() < 0.11
-    assert len(kept) > 0.9 * len(points)
 
 
 def test_the_true_pose_explains_the_shots_best():

@@ -170,7 +170,6 @@ def test_the_turn_that_leaves_the_least_angle_is_a_symmetry():
     np.testing.assert_allclose(R @ bop.symmetric_turn(R, ball), np.eye(3), atol=1e-12)
 
 
-INFO = {"1": {"diameter": 100.0}}
 INFOS = [
     *(
         "",
@@ -222,6 +221,6 @@ def test_a_symmetry_that_is_no_rigid_transform(fault, tmp_path):
 
 
 def test_a_model_wider_than_its_rows_say_is_refused(tmp_path):
-    models(tmp_path, json.dumps(INFO))
+    models(tmp_path, json.dumps({"1": {"diameter": 100.0}}))
     (tmp_path / "models/obj_000001.ply").write_text(MESHES["one_wide.ply"])
     refusal(arguments("bop"), tmp_path, "obj_000001.ply", "row 6 of 162")

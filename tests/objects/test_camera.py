@@ -13,16 +13,13 @@ def from_above(height_m, tilt_deg=0.0):
     return look_at(height_m * np.array([np.sin(tilt), 1e-6, np.cos(tilt)]), np.zeros(3))
 
 
-def test_what_the_camera_sees_of_a_plane_is_projected_back_onto_it():
+def test_a_camera_looks_at_its_target_upright_and_what_it_sees_is_projected_back_onto_it():
     T_world_camera = from_above(0.8, tilt_deg=40)
     view = MeshScene([WALL]).look(CAMERA, T_world_camera)
     points, pixels = back_project(view.depth_m, view.mesh == 0, CAMERA.matrix_3_3)
     assert len(points) == CAMERA.width * CAMERA.height
     assert abs(transform(T_world_camera, points)[:, 2]).max() < 1e-5
     assert np.allclose(view.depth_m[tuple(pixels[:, ::-1].T)], points[:, 2])
-
-
-def test_a_camera_looks_at_its_target_with_the_world_upright():
     T_world_camera = look_at(np.array([0.5, -0.4, 0.3]), np.array([0.1, 0.0, 0.05]))
     target, above = transform(inverse(T_world_camera), np.array([[0.1, 0.0, 0.05], [0.1, 0.0, 0.15]]))
     assert np.allclose(target[:2], 0)

@@ -101,20 +101,13 @@ def scaled(factor):
     return Surface("part", surface.vertices_m * factor, surface.faces)
 
 
-def with_nan():
-    surface = box("part")
-    vertices_m = surface.vertices_m.copy()
-    vertices_m[3, 1] = np.nan
-    return Surface("part", vertices_m, surface.faces)
-
-
 FAULTS = {
     "no points": (Surface("part", np.zeros((0, 3)), None), "has no points"),
     "one point": (Surface("part", np.ones((1, 3)), None), "1 point"),
     "63 points": (Surface("part", view().vertices_m[:63], None), "64 or more"),
     "one line": (Surface("part", np.outer(np.linspace(0, 0.1, 80), [1, 2, 3]), None), "line"),
     "same point": (Surface("part", np.ones((80, 3)), None), "or lie on one line"),
-    "nan": (with_nan(), "NaN"),
+    "nan": (Surface("part", np.vstack([[[0, np.nan, 0]], box().vertices_m[1:]]), box().faces), "NaN"),
     "zero area": (Surface("part", box().vertices_m * [1, 0, 0], box().faces), "no area"),
     "no faces": (Surface("part", box().vertices_m, np.zeros((0, 3), np.int64)), "no area"),
     "millimetres as metres": (scaled(1000), "set unit: mm"),

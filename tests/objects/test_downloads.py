@@ -123,18 +123,15 @@ def pack(path, files=FILES, extra=()):
     return path
 
 
-def contents(folder):
-    return {str(path.relative_to(folder)): path.read_bytes() for path in files(folder)}
-
-
 FORMATS = pytest.mark.parametrize("suffix", ["zip", "tar", "tgz"])
 
 
 @FORMATS
 def test_unpacks(tmp_path, suffix):
     archive = pack(tmp_path / f"a.{suffix}")
-    assert unpack(archive, tmp_path / "new" / "target") == tmp_path / "new" / "target"
-    assert contents(tmp_path / "new/target") == FILES
+    folder = tmp_path / "new/target"
+    assert unpack(archive, folder) == folder
+    assert {str(path.relative_to(folder)): path.read_bytes() for path in files(folder)} == FILES
 
 
 @FORMATS
@@ -199,11 +196,8 @@ def test_no_archive(tmp_path):
         unpack(tmp_path / "none.zip", tmp_path / "target")
 
 
-VIEW = "mug_1_1_1.pcd"
-
-
 def test_a_disk_that_is_too_small_is_named_before_anything_is_written(tmp_path, monkeypatch):
-    pack(tmp_path / "a.zip", {VIEW: bytes(5 * 10**6)})
+    pack(tmp_path / "a.zip", {"mug.pcd": bytes(5 * 10**6)})
     monkeypatch.setattr(downloads.shutil, "disk_usage", lambda folder: type("Usage", (), {"free": 10**6}))
     with pytest.raises(InputError, match=r"a\.zip: unpacks to 0\.005 GB, but 0\.001 GB of the disk are free"):
         unpack(tmp_path / "a.zip", tmp_path / "target")

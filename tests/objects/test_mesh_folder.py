@@ -97,11 +97,20 @@ def test_every_format_gives_the_same_box(kind, tmp_path):
     assert mesh.area == pytest.approx(BOX.area * 1e-6, rel=1e-6)
 
 
-def test_obj_with_two_materials_is_one_mesh(tmp_path):
+def test_meshes_of_several_materials_are_one_and_nodes_put_them_where_they_stand(tmp_path):
     path = tmp_path / "two.obj"
     path.write_text("mtllib none.mtl\nv 0 0 0\nv 0 1 0\nv 1 0 0\nv 1 1 0\nusemtl a\nf 1 2 3\nusemtl b\nf 2 3 4\n")
     surface = read(path, "m")
     assert trimesh.Trimesh(surface.vertices_m, surface.faces).area == pytest.approx(1)
+    scene, turned = trimesh.Scene(), trimesh.transformations.rotation_matrix(0.5, (1, 2, 3), (4, 5, 6))
+    scene.add_geometry(BOX, node_name="a", transform=turned)
+    scene.add_geometry(BOX, node_name="b", parent_node_name="a", transform=turned)
+    (tmp_path / "two.glb").write_bytes(scene.export(file_type="glb"))
+    surface = read(tmp_path / "two.glb", "m")
+    expected = trimesh.transform_points(BOX.vertices, turned)
+    both = np.r_[expected, trimesh.transform_points(expected, turned)]
+    np.testing.assert_allclose(surface.vertices_m, both, atol=1e-4)
+    assert trimesh.Trimesh(surface.vertices_m, surface.faces).area == pytest.approx(2 * BOX.area, rel=1e-5)
 
 
 def test_ply_vtk_and_glb_without_faces_are_clouds(tmp_path, capsys):
@@ -125,18 +134,6 @@ def test_ply_vtk_and_glb_without_faces_are_clouds(tmp_path, capsys):
         surface = read(tmp_path / name, "m")
         assert surface.faces is None
         np.testing.assert_allclose(surface.vertices_m, points, atol=1e-6)
-
-
-def test_meshes_of_glb_stand_where_their_nodes_put_them(tmp_path):
-    scene, turned = trimesh.Scene(), trimesh.transformations.rotation_matrix(0.5, (1, 2, 3), (4, 5, 6))
-    scene.add_geometry(BOX, node_name="a", transform=turned)
-    scene.add_geometry(BOX, node_name="b", parent_node_name="a", transform=turned)
-    (tmp_path / "two.glb").write_bytes(scene.export(file_type="glb"))
-    surface = read(tmp_path / "two.glb", "m")
-    expected = trimesh.transform_points(BOX.vertices, turned)
-    both = np.r_[expected, trimesh.transform_points(expected, turned)]
-    np.testing.assert_allclose(surface.vertices_m, both, atol=1e-4)
-    assert trimesh.Trimesh(surface.vertices_m, surface.faces).area == pytest.approx(2 * BOX.area, rel=1e-5)
 
 
 # An OBJ declares no counts: one that ends after some faces is whole for all that can be known.

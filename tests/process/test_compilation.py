@@ -29,19 +29,9 @@ def imported(folder, code=CODE, **variables):
 @pytest.fixture
 def package(tmp_path):
     """A package with a loop that calls one of another module."""
-    for name in (
-        "__init__.py",
-        "process/code_files.py",
-        "errors.py",
-        "io/__init__.py",
-        "io/files.py",
-        "process/plugins.py",
-        "process/__init__.py",
-        "process/compilation.py",
-        "process/numba_cache.py",
-        "process/build_loops.py",
-        "process/processor.py",
-    ):
+    process = ("__init__", "build_loops", "code_files", "compilation", "numba_cache", "plugins", "processor")
+    modules = ("__init__", "errors", "io/__init__", "io/files", *(f"process/{name}" for name in process))
+    for name in (f"{module}.py" for module in modules):
         (tmp_path / "gpca" / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / "gpca" / name, tmp_path / "gpca" / name)
     upper = "from gpca.lower import lower\n@njit(cache=True)\ndef upper(x):\n    return 10 * lower(x)\n"

@@ -89,13 +89,8 @@ def test_an_installed_package_is_found_by_its_entry_points_and_only_for_their_gr
     installed = folder / "site"
     installed.mkdir()
     text = "from ._net import WIDTH\nENCODERS = {'net': 'lab2.net:Net'}\nSTRATEGIES = {'no': 1}\n"
-    files = {
-        "lab2/__init__": "",
-        "lab2/encoders": text,
-        "lab2/_net": "WIDTH = 3\n",
-        "lab2/net": "from lab2 import _net\n",
-    }
-    write(installed, files)
+    files = {"__init__": "", "encoders": text, "_net": "WIDTH = 3\n", "net": "from lab2 import _net\n"}
+    write(installed, {f"lab2/{name}": text for name, text in files.items()})
     announce(installed, monkeypatch, "lab2", {"gpca.encoders": "lab2.encoders"})
     assert encoders()["net"] == "lab2.net:Net"
     assert "no" not in strategies()

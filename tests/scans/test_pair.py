@@ -21,7 +21,7 @@ def test_common_points_are_those_that_the_other_scan_has_too():
     assert scans.target_common_M[x_M > 0.5].all() and not scans.target_common_M[x_M < 0.5 - OVERLAP_M].any()
 
 
-def test_an_object_has_the_lengths_of_a_room_in_proportion():
+def test_lengths_and_limits_of_an_object_are_in_proportion_and_those_of_a_room_absolute():
     scans = pair("object")
     extent = np.ptp(floor(0.0, 1.8), axis=0)
     assert scans.size_m == pytest.approx(np.linalg.norm(extent), rel=1e-6)
@@ -29,6 +29,9 @@ def test_an_object_has_the_lengths_of_a_room_in_proportion():
     assert scans.overlap_m == pytest.approx(OVERLAP_M * scans.size_m / 3)
     assert (pair().scale, pair().overlap_m) == (1, OVERLAP_M)
     assert scans.cluster == "floor" and replace(scans, family="floors").cluster == "floors"
+    limits = ScanSuccess(room_m=0.2, object_share=0.02)
+    assert limits.limit_m(pair()) == 0.2
+    assert limits.limit_m(pair("object")) == pytest.approx(0.02 * pair("object").size_m)
 
 
 def test_the_error_is_that_of_the_common_points_alone():
@@ -43,12 +46,6 @@ def test_the_error_is_that_of_the_common_points_alone():
     turned = rigid_motion(R, middle_3 - R @ middle_3) @ scans.T_target_source
     radii_n = np.linalg.norm((common_n_3 - middle_3)[:, :2], axis=1)
     assert overlap_rmse(scans, turned) == pytest.approx(2 * np.sin(angle / 2) * np.sqrt(np.square(radii_n).mean()))
-
-
-def test_limits_are_absolute_in_rooms_and_relative_for_objects():
-    limits = ScanSuccess(room_m=0.2, object_share=0.02)
-    assert limits.limit_m(pair()) == 0.2
-    assert limits.limit_m(pair("object")) == pytest.approx(0.02 * pair("object").size_m)
 
 
 @pytest.mark.parametrize(

@@ -50,10 +50,7 @@ def test_an_explainer_of_the_suite_can_be_run_again(published, run, apart, capsy
         (["repair", "my_method.py"], "my_method.py: has no function repair, which the track repair asks; give it def"),
         (["repair", "my_method.py", "--out", "x.csv"], "--out: is no option of the track repair; leave it out"),
         (["clouds", "my_method.py"], "track 'clouds': unknown; choose one of causes, hard, frames"),
-        (
-            ["causes", "my_method.py", "--link", "javascript:alert(1)"],
-            "--link: is 'javascript:alert(1)'; give an address",
-        ),
+        (["causes", "my_method.py", "--link", "javascript:alert(1)"], "--link: is 'javascript:alert(1)'; give an a"),
         (["causes", "leaves.py"], "leaves.py: cannot be imported (SystemExit: 0)"),
         (["causes", "number.py"], "number.py: lists no CAUSE_EXPLAINERS"),
         (["causes", "above.py"], "CAUSE_EXPLAINERS has the name '../x'; use letters, digits and underscores"),

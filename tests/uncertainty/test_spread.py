@@ -111,7 +111,7 @@ def test_the_covariance_is_that_of_the_twists_from_the_reference(about):
     assert np.allclose(runs(exp(xi_n_6) @ T_ref).covariance(T_ref), np.cov(xi_n_6.T), rtol=1e-9, atol=1e-15)
 
 
-def test_one_pose_in_all_runs_is_flagged_and_finite():
+def test_a_spread_is_flagged_below_the_floor_only_and_one_pose_in_all_runs_is_finite():
     T_ref = exp(twists(1, scale=3.0))[0]
     same = runs(np.tile(T_ref, (13, 1, 1)))
     assert same.degenerate(SETTINGS.floor)
@@ -119,9 +119,6 @@ def test_one_pose_in_all_runs_is_flagged_and_finite():
     spread = divergence(np.zeros((6, 6)), runs(exp(twists())).covariance(np.eye(4)), SETTINGS.floor)
     for u in (divergence(same.covariance(np.eye(4)), covariance(0), SETTINGS.floor), spread):
         assert np.isfinite(u) and u > 1
-
-
-def test_a_spread_is_flagged_below_the_floor_only():
     deviation = np.sqrt(SETTINGS.floor)
     unit = np.random.default_rng(0).normal(size=(50, 6))
     unit = (unit - unit.mean(axis=0)) / unit.std(axis=0)

@@ -63,10 +63,7 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
         "predictions/ycb/shap_additive diagnoses/ycb/gate_rmse fig3_concepts",
     ),
     "gpca/steps/shift.py": ("shifted/ learners/ table5_shift", "predictions active_learning diagnoses/ model.pt"),
-    "gpca/experiments/kernel_grid.py": (
-        "figures/kernel_learning_curves kernels.csv table4_kernels",
-        "kernels/ figures/fig3",
-    ),
+    "gpca/experiments/kernel_grid.py": ("figures/kernel_learning_curves kernels.csv table4_k", "kernels/ figures/fig3"),
     "gpca/active_learning/acquisition.py": (
         "active_learning/ycb frame_labels/ runtime.csv table6_labels",
         "predictions embeddings learners diagnoses/ model.pt kernels/",
@@ -81,10 +78,7 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
     ),
     "gpca/frames/synthesis.py": ("poses/ embeddings/real_rgbd model.pt", "scenes instances predictions/ycb causes/"),
     "gpca/causes/policy.py": ("model.pt runtime.csv recovery/ table8_recovery", "predictions encoders diagnoses/"),
-    "gpca/experiments/concept_attribution.py": (
-        "table1_extended table2_per_concept",
-        "predictions metrics.csv figures/cause",
-    ),
+    "gpca/experiments/concept_attribution.py": ("table1_extended table2", "predictions metrics.csv figures/cause"),
     "gpca/encoders/dgcnn.py": (
         "encoders/ycb embeddings/ycb predictions/ycb/gpca/ predictions/ycb/concept_vectors shifted/ cause_encoders/ycb "
         "control_embeddings/ table2_per_concept",
@@ -154,14 +148,8 @@ def test_a_changed_setting_reruns_what_depends_on_it(finished):
     again = "predictions/ycb/gpca/ predictions/real_rgbd learners/ model.pt recovery/ table2_per_concept"
     for word in again.split():
         assert any(word in path for path in planned.outputs), word
-    assert not planned.jobs.keys() & {
-        "register",
-        "train_encoder",
-        "embed",
-        "learn_actively",
-        "learn_on_frames",
-        "diagnose",
-    }
+    kept = {"register", "train_encoder", "embed", "learn_actively", "learn_on_frames", "diagnose"}
+    assert not planned.jobs.keys() & kept
     assert not [path for path in planned.outputs if "predictions/" in path and "gpca_paper" in path]
 
 

@@ -37,7 +37,7 @@ def built(builder, **options):
     return builder.build(**{"caption": "T", "column_head": "metric", "columns": columns, "footnotes": ["n"]} | options)
 
 
-def test_a_table_has_the_rows_that_were_added_in_their_order_if_they_have_a_cell(builder):
+def test_a_table_has_the_rows_that_have_a_cell_in_their_order_and_without_any_is_refused(builder):
     table = built(builder)
     assert (table.name, table.caption, table.row_heads, table.column_head) == ("table9", "T", HEADS, "metric")
     assert [row[0][0] + " " + row[1][1] for row in table.rows] == [
@@ -52,6 +52,8 @@ def test_a_table_has_the_rows_that_were_added_in_their_order_if_they_have_a_cell
     builder.add_row(labels("cups", "oracle"), cells(b=5))
     assert [row[1][0] for row in builder.labels] == ["oracle", "gpca", "shap", "gpca", "shap", "oracle"]
     assert built(builder).cells[5, "b"].mean == 5
+    with pytest.raises(InputError, match=r"^table 'table0': has nothing to show"):
+        built(TableBuilder("table0", HEADS))
 
 
 @pytest.mark.parametrize(
@@ -71,12 +73,7 @@ def test_across_the_columns_of_a_row_all_compete_and_down_a_column_the_rivals_wh
     assert built(builder).best() == best
 
 
-def test_a_table_without_rows_is_refused_by_its_name():
-    with pytest.raises(InputError, match=r"^table 'table0': has nothing to show"):
-        built(TableBuilder("table0", HEADS))
-
-
-def test_a_cell_of_repeats_has_their_mean_and_from_three_on_their_t_interval():
+def test_a_cell_has_the_mean_of_repeats_and_the_bounds_of_an_interval_but_beside_a_heavy_tail():
     cell = cell_of_repeats([97.0, 98.0, 99.0], 600)
     assert (cell.mean, cell.seeds, cell.test_samples, cell.at_least) == (98, 3, 600, False)
     assert cell.half_width == pytest.approx(4.302653 / math.sqrt(3), abs=1e-5)
@@ -86,9 +83,6 @@ def test_a_cell_of_repeats_has_their_mean_and_from_three_on_their_t_interval():
     assert cell_of_repeats([5.0, 6.0], 400).mean == 5.5
     assert cell_of_repeats([], 200) is None
     assert math.isnan(plain_cell(0.25, 3, 600).half_width)
-
-
-def test_an_interval_has_its_bounds_and_is_not_printed_beside_a_heavy_tail():
     cell = Cell(76.9, 10.8, 1, 200, bounds=(64.9, 86.3))
     assert Column("A").text(cell) == "76.9 (64.9 to 86.3)"
     assert Column("A", interval=False).text(cell) == "76.9"

@@ -19,15 +19,12 @@ INTERVALS = pd.DataFrame(
 )
 
 
-def test_a_cell_has_the_interval_of_its_row():
+def test_a_cell_has_the_interval_of_its_row_or_the_farther_bounds_of_two():
     cell = interval_cell(INTERVALS.iloc[0])
     assert (cell.mean, cell.seeds, cell.test_samples) == (95, 3, 180)
     assert Column("A").text(cell) == "95.0 (90.0 to 98.0)"
     without = interval_cell(INTERVALS.iloc[1], factor=1)
     assert Column("ECE", decimals=3).text(without) == "0.050"
-
-
-def test_without_single_answers_the_farther_bounds_of_two_intervals_count():
     low, high = (100 * bound for bound in wilson_interval(0.9 * 33, 33))
     agreed = cautious_cell([90, 90, 90], 180, 33)
     assert agreed.bounds == pytest.approx((low, high)) and Column("A").text(agreed) == f"90.0 ({low:.1f} to {high:.1f})"
