@@ -1,7 +1,4 @@
-"""Forms of the truth's generator: what hides surface, how noise spreads, what the model lacks (docs/appendix.md).
-
-Lengths are in diameters. Each form draws from a generator of its own, so that samples of two forms are otherwise alike.
-"""
+"""Forms of the truth's generator: what hides surface, how noise spreads, what the model lacks (docs/appendix.md)."""
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -18,7 +15,7 @@ TABLE = 0.6  # radius of the part of a table that is observed
 
 
 class DrawnForm:
-    """A form with what it draws for a candidate."""
+    """A form with what it draws, by a generator of its own: samples of two forms are otherwise alike."""
 
     def __init__(self, form: Form, random: np.random.Generator) -> None:
         self.form, self.random = form, random

@@ -58,16 +58,12 @@ class Matching:
         z = np.clip((numbers_10 - self.center) / self.scale, -FARTHEST, FARTHEST)
         return np.concatenate([[1.0], z, *(z[i] * z[i:] for i in range(len(z)))])
 
-    def probabilities(self, numbers_10: np.ndarray) -> Mapping[str, float]:
-        """Return the probability of each cause; nothing but the exponential depends on the processor."""
-        term_T = self.expanded(numbers_10)
-        logits = [fsum((weights_T * term_T).tolist()) for weights_T in self.weights]
-        odds = [exp(logit - max(logits)) for logit in logits]
-        return dict(zip(CONCEPTS, (round(each / fsum(odds), DIGITS) for each in odds), strict=True))
-
     def acceptances(self, numbers_10: np.ndarray) -> dict[str, float]:
         """Return the probability by which a candidate is accepted, by the dominant cause that it may have."""
-        probabilities = self.probabilities(numbers_10)
-        if (least := min(probabilities.values())) < LEAST:
+        term_T = self.expanded(numbers_10)
+        logits = [fsum((weights_T * term_T).tolist()) for weights_T in self.weights]
+        odds = [exp(logit - max(logits)) for logit in logits]  # nothing else depends on the processor
+        probabilities = [round(each / fsum(odds), DIGITS) for each in odds]
+        if (least := min(probabilities)) < LEAST:
             return dict.fromkeys(CONCEPTS, 0.0)
-        return {cause: least / probability for cause, probability in probabilities.items()}
+        return {cause: least / probability for cause, probability in zip(CONCEPTS, probabilities, strict=True)}

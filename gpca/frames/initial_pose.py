@@ -162,10 +162,7 @@ def displace(T_camera_object: np.ndarray, diameter_m: float, settings: InitialPo
 
 
 class GlobalRegistration:
-    """FPFH and RANSAC (Rusu et al. 2009; Zhou et al. 2018) through Open3D: a stand-in for an estimator.
-
-    Of several runs, the best has most points on the model plus most points that face the camera and were measured.
-    """
+    """FPFH and RANSAC (Rusu et al. 2009; Zhou et al. 2018) through Open3D: a stand-in for an estimator."""
 
     def __init__(self, objects: ObjectClouds, index: int, settings: InitialPoseSettings) -> None:
         self._o3d, self._settings = require_open3d(), settings
@@ -201,7 +198,7 @@ class GlobalRegistration:
             seen_m = transform(T_camera_object, model_m)
             facing = np.sum(seen_m * rotate(T_camera_object, normals), axis=1) < 0
             share = fine.fitness + np.sum(tree.query(seen_m[facing])[0] < self._voxel_m) / max(1, facing.sum())
-            if share > best_share:
+            if share > best_share:  # of points on the model, and of those that face the camera and were measured
                 best, best_share = T_camera_object, share
         return best
 

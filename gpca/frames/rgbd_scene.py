@@ -98,7 +98,7 @@ def write_scenes(surfaces: Iterable[Surface], source: str, settings: SceneSettin
                 "diameter": 1e3 * diameter(surface.vertices_m, surface.name),
                 **find_symmetries(cloud_m, diameter_m),
             }
-        _write_json(partial / "models/models_info.json", info)
+        (partial / "models/models_info.json").write_text(json.dumps(info, indent=1) + "\n", encoding="utf-8")
         for scene in progress(range(settings.count), f"scenes of {source}"):
             standing = lay_table(surfaces, settings, source, scene, resting)
             middle_m = np.mean([object_.T_world_object[:3, 3] for object_ in standing], axis=0)
@@ -135,8 +135,7 @@ def lay_table(
         flat_m = transform(T_world_object, surfaces[model].vertices_m)[:, :2]
         flat_center_m = (flat_m.min(axis=0) + flat_m.max(axis=0)) / 2
         outline = MultiPoint(flat_m - flat_center_m).convex_hull
-        azimuth = random.uniform(0, 2 * np.pi)
-        outward = np.array([np.cos(azimuth), np.sin(azimuth)])
+        outward = direction(random.uniform(0, 2 * np.pi), 0.0)[:2]
         ways = (distance_m * outward for distance_m in np.arange(0, TABLE_M, 0.005))
         free = (way for way in ways if all(translate(outline, *way).distance(o) >= settings.gap_m for o in outlines))
         if (at := next(free, None)) is None:
@@ -181,14 +180,10 @@ def _write_scene(folder: Path, surfaces, standing: list[Placed], views, settings
             truth_json[image].append({"obj_id": object_.model + 1, **pose})
         camera_json[image] = {"cam_K": settings.camera.matrix_3_3.ravel().tolist(), "depth_scale": DEPTH_SCALE}
     for name, content in (("camera", camera_json), ("gt", truth_json)):
-        _write_json(folder / f"scene_{name}.json", content)
+        (folder / f"scene_{name}.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
 
 def model_color(model: int, count: int) -> tuple[float, float, float]:
     from colorsys import hsv_to_rgb
 
     return hsv_to_rgb(model * 0.618034 % 1, 0.55 if model % 2 else 0.75, 0.85)
-
-
-def _write_json(path: Path, content: dict) -> None:
-    path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")

@@ -132,11 +132,7 @@ def describe_distances(pair: ObservedPair, matched: MatchedPair | None = None) -
 
 
 def describe_points(pair: ObservedPair, matched: MatchedPair, points: int) -> np.ndarray:
-    """Return (2, points, `CHANNELS`) float32, of the observed cloud and of the model.
-
-    Coordinates (diameters); logarithms of the distances from the nearest point of the other cloud and from its plane,
-    and of the own thickness relative to its; |cosine| between the normals. Clouds of fewer points repeat some.
-    """
+    """Return (2, points, `CHANNELS`) float32, of the observed cloud and of the model; small clouds repeat points."""
     observed, model = matched.observed, matched.model
     spacing, usual_thickness = float(np.median(model.spacing)), float(np.median(model.thickness))
     log_ratio = partial(log_of_ratio, spacing=spacing)
@@ -147,6 +143,7 @@ def describe_points(pair: ObservedPair, matched: MatchedPair, points: int) -> np
     ):
         logs = log_ratio(distance, spacing), log_ratio(from_plane, usual_thickness)
         relative = log_ratio(own.thickness, other.thickness[partner])
+        # Coordinates, logarithms of ratios, and |cosine| between the normals.
         side = np.column_stack([cloud, *logs, relative, np.abs(dots(own.normals, other.normals[partner]))])
         sides.append(side[np.arange(points) % len(side)])
     return np.stack(sides).astype(np.float32)

@@ -49,10 +49,8 @@ class Frame:
 def pose_posterior(
     pair: Pair, settings: ReenactmentSettings, prior: bool = True, unit: float = 1.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return probable poses T_target_source (K, 4, 4), the best first, and their probabilities (K,).
-
-    Without a prior, the initial pose is not read. The search takes `unit` for the diameter of the target.
-    """
+    """Return probable poses T_target_source (K, 4, 4), the best first, and their probabilities (K,), for a target of
+    the diameter `unit`; without a prior, the initial pose is not read."""
     onto_center = rigid_motion(np.eye(3), pair.target.mean(axis=0) - pair.source.mean(axis=0))
     frame = Frame(pair, pair.T_target_source_init if prior else onto_center, unit)
     random = generator("registration", "posterior", pair.seed)

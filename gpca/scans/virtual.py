@@ -45,9 +45,8 @@ def room(name: str, views: int) -> ScannedScene:
 
 def compound(name: str, views: int) -> ScannedScene:
     """Return an object of this name, a few solids in one another, and its scans."""
-    random = generator("virtual scans", name)
+    random, meshes = generator("virtual scans", name), []
     size_m = random.uniform(0.12, 0.22)
-    meshes = []
     for _ in range(random.integers(4, 7)):
         at_3, extent_3 = random.uniform(-0.2, 0.2, 3), random.uniform(0.2, 0.6, 3)
         match random.integers(3):
@@ -62,8 +61,7 @@ def compound(name: str, views: int) -> ScannedScene:
     places = []
     for i in range(views):
         azimuth = 2 * np.pi * i / views + random.normal(0, 0.05)
-        height = random.uniform(0.2, 0.7)
-        to_camera_3 = np.array([np.cos(azimuth), np.sin(azimuth), height])
+        to_camera_3 = np.array([np.cos(azimuth), np.sin(azimuth), random.uniform(0.2, 0.7)])
         places.append(look_at(DISTANCE_M * to_camera_3 / np.linalg.norm(to_camera_3), np.zeros(3)))
     return _scanned(name, "object", MeshScene(meshes), places, OBJECT_CAMERA, OBJECT_NOISE)
 
