@@ -36,7 +36,7 @@ RERUN = "rerun"  # action where the re-enactment knows a better pose
 TAKE = "take"  # action where a repaired pose takes the place of the registered one
 RESCALE = "rescale"  # action where source and target differ in scale
 REFINE = "refine"  # action for a given pose from which a registration would succeed
-SURE = 0.5  # probability of a pose from which to rerun from it
+SURE = 0.5  # probability of a pose from which the advice is to start from it
 LENGTHS = ("apart", "shift", "error", "noise", "noise_floor", "tolerance", "expected_error", "differs_by")  # fields
 ADVICE = {  # per branch of the policy
     NOTHING: "none",
@@ -289,7 +289,7 @@ class Diagnosis:
     threshold: float  # of the result, from which the state is failed
     tolerance: float  # largest error of a right result
     tolerance_share: float  # the same in diameters of the target
-    start: float  # probability that registrations from starts like this one fail
+    start: float  # probability that registrations from initial poses this far off fail
     start_threshold: float  # from which the start is called bad
     causes: dict[str, float]  # probability of each concept to be a cause, given a failure
     variances: dict[str, float]  # their variances over the posterior draws (Eq. 5).

@@ -197,14 +197,13 @@ class Repair(ExplainedRegistration):
         before = f"; as registered, {self.registered_result:.2f}" if self.verdict == REPAIRED else ""
         lines.append(result_line(self.result, self.tolerance, self.tolerance_share, self.unit) + before)
         if self.verdict == REPAIRED:
-            kept = (
-                f"at most {self.wrong or 0:.0%} of repaired poses are wrong, on objects like those of its calibration"
-            )
-            lines.append(f"guarantee {NOT_CALIBRATED if self.wrong is None else kept}")
+            wrong = self.wrong and f"at most {self.wrong:.0%} of repaired poses are wrong"
+            kept = f"{wrong}, on objects like those of calibration" if wrong else NOT_CALIBRATED
+            lines.append(f"guarantee {kept}")
         if self.outliers is not None:
-            unseen = self.missing and f"{self.missing.share:.0%} of the target unseen"
-            side = self.missing and f", {side_in_words(self.missing.direction)}"
-            lines.append(f"observed  {self.outliers:.0%} outliers" + (f"; {unseen}{side}" if unseen else ""))
+            lines.append(f"observed  {self.outliers:.0%} outliers")
+            if self.missing is not None:
+                lines[-1] += f"; {self.missing.share:.0%} of the target unseen, {side_in_words(self.missing.direction)}"
         if self.spread is not None:
             lines.append(self.spread.line(self.unit, "given these points"))
             lines += self.free.lines(self.unit) if self.free else []

@@ -78,7 +78,7 @@ def test_with_a_calibration_the_share_of_wrong_repairs_is_promised(wrong):
     model, pair, T = wrong
     repair = Explainer(judging(model, 0.5, None, 0.4), device="cpu").repair(*pair, T, register=False)
     assert (repair.verdict, repair.wrong) == (REPAIRED, 0.05)
-    assert "guarantee at most 5% of repaired poses are wrong, on objects like those of its" in repair.text()
+    assert "guarantee at most 5% of repaired poses are wrong, on objects like those of calibration" in repair.text()
 
 
 def test_poses_that_fit_alike_are_given_with_what_tells_them_apart(wrong):
