@@ -76,8 +76,7 @@ def fig2_overview(run: Run, registrations: Path, embeddings: Path, predictions: 
     axes.hist(bald_N, bins=12, color=style.LIGHT_GRAY)
     axes.axvline(float(sample["bald"]), color=BLUE, linewidth=1.2)
     axes.axvline(limit, **THRESHOLD)
-    axes.set(yticks=[])
-    axes.set_xlim(left=0)
+    axes.set(yticks=[], xlim=(0, None))
     axes.spines["left"].set_visible(False)
     axes.tick_params(pad=1.5, length=2)
     axes.locator_params(axis="x", nbins=3)
@@ -149,11 +148,9 @@ def choose_samples(registrations: Registrations, path: str | Path) -> dict[str, 
         rows = np.flatnonzero((registrations.split == "test") & (registrations.concept == concept))
         ranks = [mean_ranks(getattr(registrations, f"severity_{name}")[rows]) / (len(rows) + 1) for name in names]
         distance_S[rows] = np.abs(np.array(ranks) - 0.5).max(axis=0)
-    is_shown_S = np.isfinite(distance_S)
-    object_names = list(dict.fromkeys(registrations.object_name.tolist()))
     choices = []
-    for name in object_names:
-        is_object_S = is_shown_S & (registrations.object_name == name)
+    for name in dict.fromkeys(registrations.object_name.tolist()):
+        is_object_S = np.isfinite(distance_S) & (registrations.object_name == name)
         by_concept = {c: np.flatnonzero(is_object_S & (registrations.concept == c)) for c in SEVERITIES_OF}
         if all(len(rows) for rows in by_concept.values()):
             choices.append({concept: int(rows[np.argmin(distance_S[rows])]) for concept, rows in by_concept.items()})

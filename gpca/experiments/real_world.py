@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import product
 from typing import Annotated, Any, Literal
 
 from pydantic import Field
@@ -115,10 +116,9 @@ def check(config: dict, left_out: LeftOut) -> None:
     if twice := [name for i, name in enumerate(published) if name in (*section["backbones"], *published[:i])]:
         raise InputError(f"config key {key}", f"'{twice[0]}' has rows already", "name another encoder")
     _check_training(config)
-    key, backbones = "real_world.condition_backbones", section["backbones"]
-    require_names(key, section["condition_backbones"], backbones, "backbone", encoders_left_out)
-    key, reductions = "real_world.condition_reductions", section["reductions"]
-    require_names(key, section["condition_reductions"], reductions, "reduction", left_out("reductions"))
+    for noun, gone in {"backbone": encoders_left_out, "reduction": left_out("reductions")}.items():
+        chosen = section[f"condition_{noun}s"]
+        require_names(f"real_world.condition_{noun}s", chosen, section[f"{noun}s"], noun, gone)
     for name, settings in (section["explainers"] or {}).items():
         with_key(f"real_world.explainers.{name}", require_settings, name, settings or {})
 
@@ -149,9 +149,7 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
     backbones, published = frame_rows.reduced_backbones(frames), frame_rows.published_backbones(frames)
     published_seeds = seeds[: frames.get("published_seeds")]
     conditions = [f"{REAL_WORLD}_{name}" for name in conditions_of(config)]
-    condition_backbones = [
-        f"{name}-{reduction}" for name in frames["condition_backbones"] for reduction in frames["condition_reductions"]
-    ]
+    condition_backbones = list(map("-".join, product(frames["condition_backbones"], frames["condition_reductions"])))
     classic = [name for name in frame_rows.CLASSIC if name in config["explainers"]]
     others = list(frames["explainers"])
     methods_of = {REAL_WORLD: [*backbones, *published, *classic, *others]}

@@ -46,15 +46,13 @@ class Staged:
         limits: Mapping[str, float],
     ) -> Staged:
         """Read the files of the stages; the limits are those of the config's section ``causes``."""
-        registrations = Registrations.load(registrations_npz)
+        registrations, predictions = Registrations.load(registrations_npz), read_predictions(predictions_csv)
         h_S_d = read_embedding(embeddings_npz, registrations)["embedding"]
-        predictions = read_predictions(predictions_csv)
         require_same_samples(predictions_csv, predictions, registrations.arrays)
         for column in ("bald", *(f"variance_{concept}" for concept in CONCEPTS)):
             predictions[column] = numbers(predictions_csv, predictions, column)
         observed, u_clean = read_uncertainties(uncertainty_csv)
-        samples = list(zip(registrations.split.tolist(), registrations.sample.astype(str).tolist(), strict=True))
-        u_S = observed.reindex(samples).to_numpy(float)
+        u_S = observed.reindex(list(zip(predictions["split"], predictions["sample"], strict=True))).to_numpy(float)
         if np.isnan(u_S).all():
             raise InputError(uncertainty_csv, "its samples differ from those of the registrations", "regenerate both")
         return cls(registrations, h_S_d, predictions, u_S, u_clean, Limits(**limits))

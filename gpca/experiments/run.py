@@ -29,11 +29,7 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
 
 def explainer_of(method: str, names: Mapping[str, Any]) -> str:
     """Return the explainer behind a row of predictions: itself, or GP-CA for a ``{backbone}-{reduction}``."""
-    return "gpca" if method in _embedded(names) else method
-
-
-def _embedded(names: Mapping[str, Any]) -> list[str]:
-    return [*names["backbone"], *names["published"]]
+    return "gpca" if method in (*names["backbone"], *names["published"]) else method
 
 
 def files_behind(method: str, names: Mapping[str, Any]) -> dict[str, str]:
@@ -41,8 +37,9 @@ def files_behind(method: str, names: Mapping[str, Any]) -> dict[str, str]:
 
     ``input_timings`` are the seconds that were spent before it starts.
     """
-    entry = explainer_entry(explainer_of(method, names))
-    encoder, reduction = method.split("-") if method in _embedded(names) else names["embedding"].split("/")
+    explainer = explainer_of(method, names)
+    entry = explainer_entry(explainer)
+    encoder, reduction = names["embedding"].split("/") if explainer == method else method.split("-")
     if entry.reads == "embeddings":
         return {
             "input_timings": f"timings/{{source}}/{encoder}/seed{{seed}}.csv",
