@@ -16,7 +16,7 @@ def packages(recipe):
     return set(words.split())
 
 
-def test_both_install_what_the_check_needs_and_make_the_results_unless_told_otherwise():
+def test_both_install_what_the_check_needs_make_the_results_and_hold_what_git_keeps():
     check = (ROOT / ".ci/run").read_text()
     libraries = {"libgl1", "libx11-6", "libgomp1"}
     assert all(f"missing+=({library})" in check for library in libraries)
@@ -28,9 +28,6 @@ def test_both_install_what_the_check_needs_and_make_the_results_unless_told_othe
     assert re.search(r"^RUN make environment\n\nCMD \[\"make\", \"results\"\]\n\Z", DOCKER, re.MULTILINE)
     assert re.search(r"^    make environment\n\n%runscript\n", APPTAINER, re.MULTILINE)
     assert "set -- make results" in APPTAINER
-
-
-def test_the_image_holds_what_git_keeps_of_the_results():
     kept = {line for line in (ROOT / ".gitignore").read_text().splitlines() if line.startswith("!/results/")}
     ignored = (ROOT / "containers/Dockerfile.dockerignore").read_text().splitlines()
     assert {line.strip("!/") for line in kept} == {line.strip("!/") for line in ignored if line.startswith("!")}

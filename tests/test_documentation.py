@@ -162,11 +162,8 @@ def test_the_resources_of_the_page_on_clusters_are_those_of_the_rules_and_the_pr
     profile = yaml.safe_load((ROOT / "profiles/default/config.yaml").read_text())
     page = (ROOT / "workflow/profiles/README.md").read_text()
     usual = {"threads": 1} | profile["default-resources"]
-    for declared, pattern in {
-        "threads": r"threads: (\d+)$",
-        "mem_mb": r"mem_mb=(\d+)",
-        "runtime": r"runtime=(\d+)",
-    }.items():
+    patterns = {"threads": r"threads: (\d+)$", "mem_mb": r"mem_mb=(\d+)", "runtime": r"runtime=(\d+)"}
+    for declared, pattern in patterns.items():
         declared_by_steps = {step.resources[declared] for step in steps() if declared in step.resources}
         values = sorted({usual[declared], *declared_by_steps, *map(int, re.findall(pattern, rules, re.MULTILINE))})
         [shown] = re.findall(rf"^\| `{declared}`.*\| (\d+(?: to \d+)?)\b[^|]*\|$", page, re.MULTILINE)

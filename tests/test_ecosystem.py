@@ -12,13 +12,10 @@ def read(name):
     return yaml.safe_load((ROOT / name).read_text())
 
 
-def test_the_server_runs_the_check_of_every_commit():
+def test_the_server_runs_the_check_of_every_commit_and_every_hook_is_local():
     workflow = read(".github/workflows/ci.yml")
     assert ".ci/run" in [step.get("run") for step in workflow["jobs"]["check"]["steps"]]
     assert (ROOT / ".ci/run").stat().st_mode & 0o111
-
-
-def test_every_hook_is_local_and_calls_a_tool_of_the_environment():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())
     tools = project["project"]["optional-dependencies"]["dev"]
     repos = read(".pre-commit-config.yaml")["repos"]

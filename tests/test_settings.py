@@ -46,10 +46,13 @@ class Outer:
 SOUND = {"name": "x", "inner": {}}
 
 
-def test_a_class_is_made_with_all_that_it_holds():
+def test_a_class_is_made_with_all_that_it_holds_and_a_number_has_the_bounds_of_its_type():
     settings = {"name": "x", "inner": {"ends": [2, 3]}, "kinds": ["b", "a"], "by_name": {"left": {"size": 1}}}
     made = read_settings(Outer, settings)
     assert made == Outer("x", Inner(ends=(2, 3)), kinds=("b", "a"), by_name={"left": Inner(size=1)})
+    assert read_settings(Annotated[float, Bounds(minimum=0)], 1e12) == 1e12
+    with pytest.raises(InputError, match="less than or equal to"):
+        read_settings(Annotated[float, Bounds(minimum=0)], 1e13)
 
 
 @dataclass(frozen=True)
@@ -152,12 +155,6 @@ def test_settings_of_a_function_are_its_arguments(taker, settings, message):
         return
     with pytest.raises(InputError, match=f"^thing 'x': setting {message}"):
         require_arguments("thing 'x'", taker, 2, settings)
-
-
-def test_a_number_without_bounds_of_its_own_has_those_of_its_type():
-    assert read_settings(Annotated[float, Bounds(minimum=0)], 1e12) == 1e12
-    with pytest.raises(InputError, match="less than or equal to"):
-        read_settings(Annotated[float, Bounds(minimum=0)], 1e13)
 
 
 def test_the_settings_of_several_classes_are_taken_out_of_a_section():

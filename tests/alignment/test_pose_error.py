@@ -32,13 +32,10 @@ def test_add_of_a_shift_is_its_length_and_adds_counts_each_point_to_the_nearest_
     assert adds_error(points, pose(shift=(9.0, 0, 0)), pose()) == pytest.approx((1 + 9) / 2)
 
 
-def test_no_error_depends_on_where_the_camera_is(square):
+def test_errors_of_many_poses_are_those_of_each_wherever_the_camera_is(square):
     camera = pose(37, "y", (0.3, -0.2, 0.9))
     errors = [add_error(square, camera @ pose(20), camera @ pose(5)), add_error(square, pose(20), pose(5))]
     assert errors[0] == pytest.approx(errors[1])
-
-
-def test_errors_of_many_poses_are_those_of_each_and_the_nearest_point_is_sought_among_all(square):
     poses = np.stack([pose(20), pose(0, shift=(0.1, 0.2, 0.0)), pose(90)])
     errors = PoseErrors(square, 3, symmetric=False)(poses)
     assert errors == pytest.approx([add_error(square[:3], T, pose()) for T in poses])

@@ -41,11 +41,15 @@ def test_a_treatment_that_improved_too_little_is_followed_by_the_next_and_at_las
     assert POLICY.decide(said, before=[*before[:2], Treated("noise", 0.11)]).action != QUEUE
 
 
-def test_the_chosen_uncertainty_is_exceeded_by_the_declared_share_at_most():
+def test_the_chosen_uncertainty_is_exceeded_by_the_declared_share_at_most_or_refused():
     bald_N = np.random.default_rng(0).permutation(20) / 20
     for share, above in ((0.0, 0), (0.04, 0), (0.05, 1), (0.25, 5)):
         assert (bald_N > choose_uncertain(bald_N, share)).sum() == above
     assert choose_uncertain(np.array([0.2]), 0.5) == 0.2
+    with pytest.raises(InputError, match="no calibration samples"):
+        choose_uncertain(np.zeros(0), 0.5)
+    with pytest.raises(InputError, match=r"not in \[0, 1\)"):
+        choose_uncertain(np.zeros(3), 1.0)
 
 
 def test_the_policy_of_a_config_chooses_only_what_is_not_declared():
@@ -72,10 +76,3 @@ def test_the_policy_of_a_config_chooses_only_what_is_not_declared():
 def test_thresholds_out_of_order_or_range_are_refused(given, fault):
     with pytest.raises(InputError, match=fault):
         Thresholds(**given)
-
-
-def test_no_calibration_samples_and_a_share_out_of_range_are_refused():
-    with pytest.raises(InputError, match="no calibration samples"):
-        choose_uncertain(np.zeros(0), 0.5)
-    with pytest.raises(InputError, match=r"not in \[0, 1\)"):
-        choose_uncertain(np.zeros(3), 1.0)

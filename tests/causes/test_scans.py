@@ -45,9 +45,7 @@ def test_no_natural_registration_fails_by_noise():
     assert table["noise"].tolist() == [0] and table["sensor_noise"][0] > 0
     assert table["crop"][0] == pytest.approx(1 - pair.overlap)
     assert table["rotation_rad"][0] == pytest.approx(np.deg2rad(20))
-    assert table["translation"][0] == pytest.approx(
-        0.3 / pair.unit_m, abs=0.03
-    )  # of the points that are drawn
+    assert table["translation"][0] == pytest.approx(0.3 / pair.unit_m, abs=0.03)  # of the points that are drawn
 
 
 def test_a_crop_of_one_scan_alone_names_a_cause_where_a_global_method_started():

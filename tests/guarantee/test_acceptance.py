@@ -36,7 +36,7 @@ def test_few_right_poses_are_not_enough(count, accepted):
     assert limit == (pytest.approx(score_N[-1]) if accepted else None)
 
 
-def test_equal_scores_are_accepted_together_and_infinite_ones_never(monkeypatch):
+def test_equal_scores_are_accepted_together_and_in_hindsight_the_largest_limit_with_few_wrong(monkeypatch):
     score_N = np.array([0.1] * 40 + [0.2] * 40 + [inf])
     wrong_N = np.array([False] * 79 + [True, False])
     family_N = np.arange(81) % 8
@@ -47,9 +47,6 @@ def test_equal_scores_are_accepted_together_and_infinite_ones_never(monkeypatch)
     wrong_N[40:60] = True
     assert accepted_below(score_N, wrong_N, family_N) == pytest.approx(0.1)
     assert accepted_below(score_N[:0], wrong_N[:0], family_N[:0]) is None
-
-
-def test_in_hindsight_the_largest_limit_with_few_wrong_counts_for_each_weight(monkeypatch):
     score_N, wrong_N = np.array([3.0, 1, 2, 2, inf]), np.array([False, False, True, False, False])
     weights_B_N = np.array([[1.0] * 5, [1, 1, 0, 1, 1], [0, 0, 1, 0, 0]])
     monkeypatch.setattr(acceptance, "WRONG", 0.3)

@@ -164,10 +164,7 @@ def test_pandas_writes_nothing_for_nan(tmp_path):
 
 
 FAULTS = {
-    "few.npy": (
-        lambda path: np.save(path, POINTS[:, :2]),
-        r"has the shape \(70, 2\), not \(N, 3\); export it as three",
-    ),
+    "few.npy": (lambda path: np.save(path, POINTS[:, :2]), r"has the shape \(70, 2\), not \(N, 3\); export it as"),
     "turned.npy": (lambda path: np.save(path, POINTS.T), r"has the shape \(3, 70\), not \(N, 3\); transpose it"),
     "texts.npy": (lambda path: np.save(path, POINTS.astype(str)), "holds values of type <U32, not numbers"),
     "pickle.npy": (lambda path: np.save(path, np.array([{}]), allow_pickle=True), "is not a readable .npy file"),

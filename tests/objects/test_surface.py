@@ -17,14 +17,8 @@ def test_arrays_lists_tensors_and_clouds_of_open3d_give_their_points():
 
     o3d = require_open3d()
     tensors = o3d.t.geometry.PointCloud(o3d.core.Tensor(POINTS.astype(np.float32)))
-    for cloud in (
-        POINTS,
-        POINTS.tolist(),
-        torch.tensor(POINTS),
-        open3d_cloud(POINTS),
-        tensors,
-        tensors.point.positions,
-    ):
+    clouds = (POINTS, POINTS.tolist(), torch.tensor(POINTS), open3d_cloud(POINTS), tensors, tensors.point.positions)
+    for cloud in clouds:
         points = as_points(cloud, "source")
         assert points.dtype == np.float64
         np.testing.assert_allclose(points, POINTS, atol=1e-6)

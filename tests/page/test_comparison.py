@@ -52,16 +52,13 @@ def test_verdicts_are_counted_from_the_best_to_the_worst_repeats_and_deviations_
     assert (rows_of(shown)[0]["group"], rows_of(shown)[0]["verdict"]) == ("repeat", "close")
 
 
-def test_what_a_table_was_measured_on_is_said_once(tmp_path):
+def test_a_comparison_may_be_absent_is_of_one_form_and_says_once_what_a_table_was_measured_on(tmp_path):
+    assert page_comparison(tmp_path / "comparison.csv") is None
+    with pytest.raises(InputError, match="column 'decimals' is missing"):
+        page_comparison(written(tmp_path, HEAD.replace("decimals", "digits") + LINES[0]))
     cups = LINES[0].replace("I,YCB,", "I,Coffee Cup,").replace(",YCB,mean", ",Coffee Cup (scans),mean")
     other = LINES[0].replace("I,YCB,", "I,All,").replace(",YCB,mean", ",Coffee Cup (scans),mean")
     table_i, table_iii = page_comparison(written(tmp_path, HEAD + LINES[0] + cups + other + LINES[2]))["tables"]
     assert table_i["objects"] == "YCB; Coffee Cup (scans)"
     assert [row["objects"] for row in table_i["rows"]] == ["", "", "Coffee Cup (scans)"]
     assert (table_iii["objects"], table_iii["rows"][0]["objects"]) == ("YCB", "")
-
-
-def test_there_need_not_be_a_comparison_but_one_of_another_form_is_refused(tmp_path):
-    assert page_comparison(tmp_path / "comparison.csv") is None
-    with pytest.raises(InputError, match="column 'decimals' is missing"):
-        page_comparison(written(tmp_path, HEAD.replace("decimals", "digits") + LINES[0]))

@@ -33,10 +33,16 @@ def test_every_builder_and_reader_takes_what_its_entry_gives(name):
             inspect.signature(load(each.read)).bind(None)
 
 
-def test_no_name_is_registered_twice_and_the_papers_tables_and_figures_are_marked():
+def test_no_name_is_registered_twice_and_one_entry_stands_for_a_figure_of_each_source(monkeypatch):
     assert len(ENTRIES) == len(registered())
     paper = {name.split("_")[0] for name, entry in ENTRIES.items() if entry.paper}
     assert paper == {*(f"table{n}" for n in range(1, 8)), *(f"fig{n}" for n in range(1, 7))}
+    objects = result(given("objects/{source}.npz"), name="objects_{source}", title="Objects: {source}")
+    monkeypatch.setattr(registry, "registered", lambda: (objects,))
+    ycb, mine = results_of(NAMES)
+    assert (ycb.name, mine.title) == ("objects_ycb", "Objects: mine")
+    assert ycb.files(NAMES) == {"metrics": "objects/ycb.npz"}
+    assert (mine.arguments, objects.arguments) == ({"source": "mine"}, {})
 
 
 def test_files_are_listed_where_a_name_is_a_list_and_nothing_is_made_where_one_is_empty():
@@ -53,15 +59,6 @@ def test_files_are_listed_where_a_name_is_a_list_and_nothing_is_made_where_one_i
     assert not entry.is_made(NAMES | {"gpca": ""})
     assert not result(given("x/{explainer}.csv"), only={"explainer": ("gone",)}).is_made(NAMES)
     assert not result(given("metrics.csv"), needs=("explainer",)).is_made(NAMES | {"explainer": []})
-
-
-def test_one_entry_stands_for_a_figure_of_each_source(monkeypatch):
-    objects = result(given("objects/{source}.npz"), name="objects_{source}", title="Objects: {source}")
-    monkeypatch.setattr(registry, "registered", lambda: (objects,))
-    ycb, mine = results_of(NAMES)
-    assert (ycb.name, mine.title) == ("objects_ycb", "Objects: mine")
-    assert ycb.files(NAMES) == {"metrics": "objects/ycb.npz"}
-    assert (mine.arguments, objects.arguments) == ({"source": "mine"}, {})
 
 
 def test_a_builder_is_given_the_run_and_what_was_read(tmp_path):

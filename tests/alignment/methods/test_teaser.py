@@ -60,7 +60,7 @@ def test_the_rotation_withstands_half_of_wrong_differences(seed):
     assert residuals[weights > 0.99].max() < 1.6 * NOISE and residuals[weights < 0.01].min() > 1.4 * NOISE
 
 
-def test_a_vote_is_the_best_of_a_fine_grid():
+def test_a_vote_is_the_best_of_a_fine_grid_and_a_search_cut_short_says_so_with_a_clique():
     random = np.random.default_rng(0)
     for _ in range(20):
         shifts = np.concatenate([random.normal(0.3, 0.004, 12), random.uniform(-1, 1, 60)])
@@ -71,6 +71,11 @@ def test_a_vote_is_the_best_of_a_fine_grid():
 
         grid = np.linspace(-1.1, 1.1, 20_001)
         assert cost(t) <= min(map(cost, grid)) + 1e-15
+    adjacent = graph(120, 0.9, 0)
+    clique, certain = largest_clique(adjacent, most_branches=200)
+    assert not certain and len(clique) > 10 and is_clique(adjacent, clique)
+    again, _ = largest_clique(adjacent, most_branches=200)
+    assert np.array_equal(clique, again)
 
 
 def graph(nodes, density, seed):
@@ -90,14 +95,6 @@ def test_none_of_all_subsets_is_a_larger_clique(density, seed):
     clique, certain = largest_clique(adjacent)
     assert certain and len(clique) == largest
     assert is_clique(adjacent, clique) and np.array_equal(clique, np.unique(clique))
-
-
-def test_a_search_that_is_cut_short_says_so_and_gives_a_clique():
-    adjacent = graph(120, 0.9, 0)
-    clique, certain = largest_clique(adjacent, most_branches=200)
-    assert not certain and len(clique) > 10 and is_clique(adjacent, clique)
-    again, _ = largest_clique(adjacent, most_branches=200)
-    assert np.array_equal(clique, again)
 
 
 @pytest.mark.parametrize(("graph", "largest"), [(np.ones((1200,) * 2), 1200), (np.zeros((3, 3)), 1), (np.eye(0), 0)])

@@ -48,7 +48,7 @@ def render_cloud(*args):
     return Solid.of(*args).image
 
 
-def test_shows_the_nearer_of_two_surfaces():
+def test_the_nearer_of_two_surfaces_is_shown_and_points_behind_it_are_hidden():
     slanted = np.array([0.8, 0.0, 0.6])
     low = _square(0.0, [0.0, 0.0, 1.0])
     high = _square(0.3, slanted, half=0.5)
@@ -60,6 +60,10 @@ def test_shows_the_nearer_of_two_surfaces():
     assert abs(hidden[middle].mean() - alone[middle].mean()) < 0.1
     assert seen[middle].mean() < alone[middle].mean() - 0.15  # the slanted normals are darker
     assert abs(seen[border].mean() - alone[border].mean()) < 0.1
+    ball = Solid.of(*_ball(0.03, "ball"), FROM_ABOVE, 40)
+    assert ball.extent == pytest.approx([each * 0.03 / 0.9 for each in (-1, 1, -1, 1)], rel=0.02)
+    seen = np.array([[0.0, 0.0, 0.03], [0.0, 0.0, 0.02], [0.0, 0.0, -0.03], [0.032, 0.032, -0.03], [1.0, 0.0, -1.0]])
+    assert ball.hides(seen).tolist() == [False, True, True, False, False]
 
 
 def test_ball_is_a_closed_disc_on_white_lit_from_above_left():
@@ -85,13 +89,6 @@ def test_unit_of_length_and_sign_of_normals_do_not_matter_and_flat_clouds_are_dr
     line = np.column_stack([np.linspace(0, 1, 50), np.zeros(50), np.zeros(50)])
     image = render_cloud(line, np.tile([0.0, 0.0, 1.0], (50, 1)), FROM_ABOVE, 40)
     assert image.min() < 1
-
-
-def test_a_point_is_hidden_by_what_lies_in_front_of_it():
-    ball = Solid.of(*_ball(0.03, "ball"), FROM_ABOVE, 40)
-    assert ball.extent == pytest.approx([each * 0.03 / 0.9 for each in (-1, 1, -1, 1)], rel=0.02)
-    seen = np.array([[0.0, 0.0, 0.03], [0.0, 0.0, 0.02], [0.0, 0.0, -0.03], [0.032, 0.032, -0.03], [1.0, 0.0, -1.0]])
-    assert ball.hides(seen).tolist() == [False, True, True, False, False]
 
 
 def test_a_sheet_is_as_wide_as_the_text_and_the_same_bytes_each_time(tmp_path, same_bytes):
