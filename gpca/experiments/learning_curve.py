@@ -65,9 +65,8 @@ def collect(_run: Run, files: Paths) -> Frame:
     """Means over the orders; ``concept`` is the number of samples."""
     means = read_curves(files).groupby(["source", "learner", "samples", "seed"], sort=False)[list(MEASURED)].mean()
     records = [
-        (NAME, source, learner, metric, f"{samples:g}", seed, float(value))
-        for (source, learner, samples, seed), values in means.iterrows()
-        for metric, value in values.items()
+        (NAME, source, learner, metric, f"{samples:g}", seed, value)
+        for (source, learner, samples, seed, metric), value in means.stack().items()
     ]
     return tidy(records, "learning curves")
 
