@@ -1,10 +1,10 @@
 """All experiments, their steps, tables and figures: a new file of ``gpca/experiments/`` is found at the next call."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from importlib import import_module
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from gpca.declarations.experiment import Experiment
@@ -47,27 +47,20 @@ def experiments() -> tuple[Experiment, ...]:
 
 def steps() -> list[Step]:
     """Steps that experiments declare."""
-    return [
-        value
-        for experiment in experiments()
-        for module in _modules(experiment)
-        for value in vars(module).values()
-        if isinstance(value, Step)
-    ]
+    return [value for experiment in experiments() for _, value in _values(experiment) if isinstance(value, Step)]
 
 
-def _modules(experiment: Experiment) -> list[ModuleType]:
-    return [import_module(f"{PACKAGE}.{name}") for name in (experiment.name, *experiment.beside)]
+def _values(experiment: Experiment) -> Iterator[tuple[str, Any]]:
+    """Name of a module of the experiment, and each value in it."""
+    for name in (experiment.name, *experiment.beside):
+        module = import_module(f"{PACKAGE}.{name}")
+        yield from ((module.__name__, value) for value in vars(module).values())
 
 
 def _declared(experiment: Experiment, kind: str) -> list[Any]:
     """Functions of an experiment's modules that declare a ``result``, or ``tidy`` files."""
-    return [
-        value
-        for module in _modules(experiment)
-        for value in vars(module).values()
-        if hasattr(value, kind) and getattr(value, "__module__", "") == module.__name__
-    ]
+    found = ((module, value) for module, value in _values(experiment) if hasattr(value, kind))
+    return [value for module, value in found if getattr(value, "__module__", "") == module]
 
 
 @cache

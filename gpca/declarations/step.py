@@ -100,7 +100,7 @@ def rule_of(step: Step, plan: Plan) -> Rule:
     """The rule of a step."""
     patterns = [each for outputs in step.outputs.values() for each in _listed(outputs)]
     in_outputs = dict.fromkeys(found for each in patterns for found in BRACED.findall(each))
-    values = {wildcard: plan.names.get(_source(step, wildcard)) for _, wildcard in in_outputs}
+    values = {wildcard: plan.names.get(step.where.get(wildcard, wildcard)) for _, wildcard in in_outputs}
     wildcards = [wildcard for star, wildcard in in_outputs if not star and not isinstance(values[wildcard], str)]
     modules = (step.run, *step.modules(plan))
 
@@ -129,10 +129,6 @@ def rule_of(step: Step, plan: Plan) -> Rule:
     )
 
 
-def _source(step: Step, name: str) -> str:
-    return step.where.get(name, name)
-
-
 def _listed(patterns: str | Sequence[str]) -> Sequence[str]:
     return [patterns] if isinstance(patterns, str) else patterns
 
@@ -145,14 +141,14 @@ def _files(step: Step, plan: Plan, patterns: str | Sequence[str]) -> str | list[
 
 def _expanded(step: Step, plan: Plan, pattern: str) -> list[str]:
     names = list(dict.fromkeys(name for star, name in BRACED.findall(pattern) if star))
-    values = (plan.names[_source(step, name)] for name in names)
+    values = (plan.names[step.where.get(name, name)] for name in names)
     files = []
     for chosen in product(*([each] if isinstance(each, str) else each for each in values)):
         by_name = dict(zip(names, chosen, strict=True))
 
         def filled(match: re.Match, by_name: Mapping[str, Any] = by_name) -> str:
             star, name = match.groups()
-            value = by_name.get(name) if star else plan.names.get(_source(step, name))
+            value = by_name.get(name) if star else plan.names.get(step.where.get(name, name))
             return str(value) if star or isinstance(value, str) else match[0]
 
         files.append(BRACED.sub(filled, pattern))

@@ -172,18 +172,13 @@ def write_comparison(
             {
                 "name": name,
                 "title": titles.get(name, name),
-                "same": len({_digest(each[name]) for each in figures}) == 1,
+                "same": len({sha256_of_file(each[name]) for each in figures}) == 1,
                 "paths": [relpath(each[name].resolve(), path.parent.resolve()) for each in figures],
             }
             for name in _shared(figures, titles)
         ],
     )
     write_text(path, text)
-
-
-def _digest(path: Path) -> str:
-    require_file(path, "no such file", AGAIN)
-    return sha256_of_file(path)
 
 
 def _recorded(folder: Path) -> tuple[dict[str, dict[str, int]], dict[str, frozenset[str]], dict[tuple[str, ...], dict]]:

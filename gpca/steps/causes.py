@@ -9,23 +9,32 @@ from typing import Any
 from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import read_timings, write_timings
 from gpca.causes.dataset import LABELS, Causes, with_label
+from gpca.causes.descriptors import describe_all
+from gpca.causes.drawing import draw_causes
+from gpca.causes.policy import RecoveryPolicy
 from gpca.causes.settings import CauseSettings, DescriptorSettings
+from gpca.classifier.gpc import GPC
+from gpca.classifier.settings import GPCSettings
+from gpca.encoders.inference import TrainedEncoder
 from gpca.encoders.registry import EncoderSettings
 from gpca.io.arrays import save_arrays
 from gpca.io.csv_file import write_csv
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
+from gpca.model.clouds import Familiarity
+from gpca.model.diagnoser import TrainingSet, learn
+from gpca.model.file import Model
+from gpca.model.proposed import Proposed, pose_errors, proposed_for_all, with_repair
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.reenactment.dataset import Reenactments, reenact_all
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import read_settings
 
 
 def causes(job: Job) -> None:
     """Draw candidates, measure their causes and keep a balanced set -> ``causes/{source}/seed{seed}.npz``."""
-    from gpca.causes.drawing import draw_causes
-
     section, icp = job.settings_and_icp()
     settings = CauseSettings.from_dict(section, icp)
     objects = ObjectClouds.load(job.objects, job.source)
@@ -38,16 +47,12 @@ def causes(job: Job) -> None:
 
 def describe(job: Job) -> None:
     """Describe every pair -> ``descriptors/{source}/seed{seed}.npz``."""
-    from gpca.causes.descriptors import describe_all
-
     section, icp = job.settings_and_icp()
     _measure(job, job.descriptors, describe_all, DescriptorSettings(**section), ICPSettings(**icp))
 
 
 def reenact(job: Job) -> None:
     """Re-enact every pair under hypotheses of its true pose -> ``reenactments/{source}/seed{seed}.npz``."""
-    from gpca.reenactment.dataset import reenact_all
-
     settings = read_settings(ReenactmentSettings, job.section("reenactment"))
     truth = CauseSettings.from_dict(job.section("causes"), job.section("icp"))
     _measure(job, job.reenactments, reenact_all, settings, truth)
@@ -90,16 +95,7 @@ def train_on_causes(job: Job) -> None:
 
 def model(job: Job) -> None:
     """Fit all classifiers and write them with the encoder and the policy -> ``model.pt``, for ``gpca explain``."""
-    from gpca.causes.policy import RecoveryPolicy
-    from gpca.classifier.gpc import GPC
-    from gpca.classifier.settings import GPCSettings
-    from gpca.encoders.inference import TrainedEncoder
     from gpca.encoders.training import load_model
-    from gpca.model.clouds import Familiarity
-    from gpca.model.diagnoser import TrainingSet, learn
-    from gpca.model.file import Model
-    from gpca.model.proposed import Proposed, pose_errors, proposed_for_all, with_repair
-    from gpca.reenactment.dataset import Reenactments
 
     inputs = [job.registrations, job.encoder, job.embeddings, *job.objects, *job.causes, *job.reenactments]
     with record_provenance([job.out], inputs, job.settings, seed=job.seed):

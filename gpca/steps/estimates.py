@@ -12,6 +12,8 @@ from time import perf_counter
 
 import numpy as np
 
+from gpca.alignment.batched_icp import BatchedICP, BatchedPlaneICP, register_each
+from gpca.alignment.features import estimate_normals
 from gpca.alignment.icp import ICPSettings
 from gpca.alignment.methods.interface import ITERATIONS, REACH, Pair
 from gpca.alignment.methods.registry import make_method
@@ -96,9 +98,6 @@ def draw_twists(kind: Kind, registered: RegisteredPair, redraws: Redraws, repeat
 
 def _register_each(method: str, clouds: Clouds, starts_n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Poses of other clouds registered from each start (n, 4, 4), and which found a correspondence (n,)."""
-    from gpca.alignment.batched_icp import BatchedICP, BatchedPlaneICP, register_each
-    from gpca.alignment.features import estimate_normals
-
     parts = []
     if method == POINT_TO_PLANE:
         for at in range(0, len(starts_n), AT_ONCE):

@@ -1,29 +1,34 @@
 """The steps of depth frames: rendered scenes, instances, their registrations and re-enactments."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 
 from gpca.attribution.predictions import write_timings
 from gpca.causes.dataset import Causes
+from gpca.causes.frames import chosen_starts, measure_frames
 from gpca.causes.settings import CauseSettings, FrameCauseSettings
 from gpca.errors import InputError
+from gpca.frames import dataset
+from gpca.frames.dataset import meshes_of, models_of
+from gpca.frames.initial_pose import InitialPoseSettings
+from gpca.frames.instances import Instances, read_instances
+from gpca.frames.rgbd_scene import SceneSettings, stable_poses, write_scenes
+from gpca.frames.starts import Starts, all_starts
+from gpca.frames.synthesis import FrameSettings, make_frame_registrations
 from gpca.io.csv_file import write_csv
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
+from gpca.objects import procedural
 from gpca.objects.canonical import EVALUATION, ObjectClouds, sample_objects
+from gpca.pairs.judge import Judges
+from gpca.pairs.synthesis import RegistrationSettings
+from gpca.reenactment import frames as reenactment
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import read_settings
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from gpca.frames.dataset import Dataset
-    from gpca.frames.instances import Instances
+from gpca.steps.registration_trials import outcomes_by
 
 ALL_OBJECTS = "all"
 SHOWN_METHOD = "point_to_point"  # ICP as in the registrations that are shown
@@ -31,10 +36,6 @@ SHOWN_METHOD = "point_to_point"  # ICP as in the registrations that are shown
 
 def scenes(job: Job) -> None:
     """Lay table-top scenes of procedural objects, or of datasets' models, and render them -> a BOP dataset."""
-    from gpca.frames import dataset
-    from gpca.frames.rgbd_scene import SceneSettings, stable_poses, write_scenes
-    from gpca.objects import procedural
-
     sections = dict(job.settings)
     datasets, role = sections.pop("datasets", None), sections.pop("role", EVALUATION)
     is_all = sections.pop("rendered", ALL_OBJECTS) == ALL_OBJECTS
@@ -46,7 +47,7 @@ def scenes(job: Job) -> None:
             write_scenes(surfaces, job.source, settings, job.out)
             return
         frames = dataset.datasets_of(datasets, job.data_dir, job.downloads, None, job.get("splits"), role)
-        shown = dataset.distinct_surfaces(dataset.models_of(frames)) if is_all else dataset.untested_surfaces(frames)
+        shown = dataset.distinct_surfaces(models_of(frames)) if is_all else dataset.untested_surfaces(frames)
         models = []
         for surface in shown:
             try:
@@ -62,39 +63,30 @@ def scenes(job: Job) -> None:
         write_scenes(models, job.source, replace(settings, families=()), job.out)
 
 
-def _datasets(job: Job) -> dict[str, Dataset]:
-    from gpca.frames.dataset import datasets_of
-
+def _datasets(job: Job) -> dict[str, dataset.Dataset]:
     places = job.get("scenes"), job.get("splits"), job.settings.get("role", EVALUATION)
-    return datasets_of(job.settings.get("datasets"), job.data_dir, job.downloads, *places)
+    return dataset.datasets_of(job.settings.get("datasets"), job.data_dir, job.downloads, *places)
 
 
 def _inputs(job: Job, *files: Path) -> list[Path]:
-    from gpca.frames.dataset import files_behind
-
-    return [*files, *files_behind(job.settings.get("datasets"), job.data_dir, job.get("scenes"))]
+    return [*files, *dataset.files_behind(job.settings.get("datasets"), job.data_dir, job.get("scenes"))]
 
 
 def _instances(job: Job, name: str) -> tuple[Instances, ObjectClouds]:
-    from gpca.frames.instances import Instances
-
     return Instances.load(job.instances, (name, None)), ObjectClouds.load(job.objects, name)
 
 
 def instances(job: Job) -> None:
     """Read models and frames of BOP datasets -> instances with initial poses, and the models' canonical clouds."""
-    from gpca.frames.dataset import distinct_surfaces, read_models, with_shared_models
-    from gpca.frames.initial_pose import InitialPoseSettings
-    from gpca.frames.instances import read_instances
-
     datasets, inputs = _datasets(job), _inputs(job)
     initial_pose = InitialPoseSettings(**job.settings.get("initial_pose", {}))
     declared = {**job.settings, "surface_points": job.surface_points}
     with record_provenance([job.instances, job.objects], inputs, declared):
-        frames = {name: dataset.frames() for name, dataset in datasets.items()}
-        models = with_shared_models({name: read_models(datasets[name], shown) for name, shown in frames.items()})
-        objects = sample_objects(distinct_surfaces(models), job.source, job.surface_points)
-        read = {name: (dataset, frames[name], models[name]) for name, dataset in datasets.items()}
+        frames = {name: each.frames() for name, each in datasets.items()}
+        own = {name: dataset.read_models(datasets[name], shown) for name, shown in frames.items()}
+        models = dataset.with_shared_models(own)
+        objects = sample_objects(dataset.distinct_surfaces(models), job.source, job.surface_points)
+        read = {name: (each, frames[name], models[name]) for name, each in datasets.items()}
         instances = read_instances(read, objects, initial_pose)
         named = job.get("name", job.source)
         objects.save(job.objects, named)
@@ -103,9 +95,6 @@ def instances(job: Job) -> None:
 
 def frame_registrations(job: Job) -> None:
     """Perturb and align instances -> ``registrations/{source}/seed{seed}.npz``, and their pose errors."""
-    from gpca.frames.synthesis import FrameSettings, make_frame_registrations
-    from gpca.pairs.synthesis import RegistrationSettings
-
     of_registrations = dict(job.settings)
     own = {name: of_registrations.pop(name) for name in ("test_share", "occluders") if name in of_registrations}
     settings = FrameSettings(**own, registration=read_settings(RegistrationSettings, of_registrations))
@@ -120,10 +109,6 @@ def frame_registrations(job: Job) -> None:
 
 def frame_causes(job: Job) -> None:
     """Choose starts, register the instances from each, and measure the causes -> ``frame_causes/seed{seed}.npz``."""
-    from gpca.causes.frames import chosen_starts, measure_frames
-    from gpca.frames.dataset import meshes_of, models_of
-    from gpca.frames.starts import all_starts
-
     inputs, outputs = _inputs(job, job.instances, job.objects), [job.frame_causes, job.samples, job.starts]
     with record_provenance(outputs, inputs, job.settings, seed=job.seed):
         instances, objects = _instances(job, job.source)
@@ -147,9 +132,6 @@ def _errors(
     causes: Causes, objects: ObjectClouds, axes: tuple[str, int], settings: FrameCauseSettings
 ) -> dict[str, np.ndarray]:
     """Return the errors (S,) of each other method from the same starts, in diameters; infinite where it fails."""
-    from gpca.pairs.judge import Judges
-    from gpca.steps.registration_trials import outcomes_by
-
     registrations, judges = causes.registrations, Judges(objects, f"objects of {axes[0]}")
     outcomes = outcomes_by({name: {} for name in settings.methods}, registrations, *axes, settings.points)
     errors = {name: np.full(len(causes), np.inf) for name in outcomes}
@@ -163,10 +145,6 @@ def _errors(
 
 def reenact_frames(job: Job) -> None:
     """Re-enact the registrations of depth frames -> ``reenactments/{source}/seed{seed}.npz``."""
-    from gpca.frames.dataset import meshes_of, models_of
-    from gpca.frames.starts import Starts
-    from gpca.reenactment.frames import reenact_frames
-
     settings = read_settings(ReenactmentSettings, job.section("reenactment"))
     truth = CauseSettings.from_dict(job.section("causes"), job.section("icp"))
     inputs, axes = _inputs(job, job.frame_causes, job.starts, job.instances, job.objects), job.axes
@@ -174,4 +152,5 @@ def reenact_frames(job: Job) -> None:
         causes, starts = Causes.load(job.frame_causes, axes), Starts.load(job.starts, axes)
         instances, objects = _instances(job, job.source)
         meshes = meshes_of(models_of(_datasets(job)), objects, causes.registrations.object_index.tolist())
-        reenact_frames(causes, starts, instances, objects, meshes, settings, truth).save(job.reenactments)
+        enacted = reenactment.reenact_frames(causes, starts, instances, objects, meshes, settings, truth)
+        enacted.save(job.reenactments)

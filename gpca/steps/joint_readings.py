@@ -13,7 +13,6 @@ import numpy as np
 from gpca.active_learning.rounds import make_task
 from gpca.active_learning.settings import LOOK_EVERY, ActiveLearningSettings
 from gpca.classifier.gpc import GPC
-from gpca.classifier.settings import GPCSettings
 from gpca.comparison import joint_reading as reading
 from gpca.comparison.joint_reading import CHOICES, DEVELOPMENT, EVALUATED, PROTOCOL, SEVERITIES, Joint, part_name
 from gpca.comparison.published import read_published
@@ -31,10 +30,11 @@ from gpca.pairs.synthesis import RegistrationSettings, make_registrations
 from gpca.process.progress import progress
 from gpca.seeds import seed_of_file
 from gpca.settings import read_settings
+from gpca.steps.readings import learners
 from gpca.steps.readings.files import RunFiles, accuracies, diagnostics_of_scores, like_the_training, train_and_test
 from gpca.steps.readings.knobs import accuracies_of_magnitudes, runs_of
 from gpca.steps.readings.labels import NEW, passes_to, until
-from gpca.steps.readings.learners import FITTED, FOREST, SVM, StartedGPC, relevant, svm_scores, to_unit_norm
+from gpca.steps.readings.learners import FITTED, FOREST, SVM, StartedGPC, method_of, relevant, scheduled
 from gpca.uncertainty.interventions import MIDDLE, UPPER
 from gpca.uncertainty.settings import UncertaintySettings
 
@@ -159,13 +159,11 @@ def values(samples: ReadingSamples, severities: str, choices: Choices, settings:
         for schedule in PRINTED:
             key = (schedule, *relevant(start, schedule[0]).values())
             if key not in fits:
-                started = StartedGPC(gpc_settings(settings, schedule), start, *samples.axes)
+                started = StartedGPC(scheduled(settings.gpc, schedule), start, *samples.axes)
                 fits[key] = started.fit(train.embedding, train.concept)
             fitted[schedule] = fits[key]
-        for (kernel, rate, iterations), gpc in fitted.items():
-            right = accuracies(test.concept, gpc.attribute(test.embedding)[0])
-            method = f"{kernel}-{rate:g}-{iterations}"
-            yield part_name("schedules", start), method, "accuracy", ALL, right["accuracy", ALL]
+            right = accuracies(test.concept, fits[key].attribute(test.embedding)[0])
+            yield part_name("schedules", start), method_of(schedule), "accuracy", ALL, right["accuracy", ALL]
         for kernel in choices["kernel"]:
             joint, gpc = start | {"kernel": kernel}, fitted[SCHEDULES[kernel]]
             # Accuracies of GP-CA in Tables I and II and of the GPC in V, and the diagnostics of the latter.
@@ -181,7 +179,7 @@ def values(samples: ReadingSamples, severities: str, choices: Choices, settings:
 def _learner_values(samples: ReadingSamples, choices: Choices) -> Iterator[Value]:
     """Yield accuracies and diagnostics of the forest and the linear SVM, by the scale of their inputs."""
     for joint in _combinations(choices, (SEVERITIES, "inputs")):
-        scale = to_unit_norm if joint["inputs"] == "unit_norm" else np.asarray
+        scale = learners.to_unit_norm if joint["inputs"] == "unit_norm" else np.asarray
 
         def scaled(registrations: Registrations, scale: Callable = scale) -> Registrations:
             return replace(registrations, attached={"embedding": scale(registrations.embedding)})
@@ -193,7 +191,7 @@ def _learner_values(samples: ReadingSamples, choices: Choices) -> Iterator[Value
         h_S_d = np.concatenate([part.embedding for _, part, _ in parts])
         ends = np.cumsum([len(part) for _, part, _ in parts])[:-1]
         inputs = joint["inputs"] if joint["inputs"] == "standardised" else "raw"
-        by_svm = np.split(svm_scores(train, h_S_d, "svc", inputs, "platt"), ends)
+        by_svm = np.split(learners.svm_scores(train, h_S_d, "svc", inputs, "platt"), ends)
         scored_by = {
             FOREST: {name: (forest.explain(part).scores_N_C, part, rows) for name, part, rows in parts},
             SVM: {name: (scores_S_C, part, rows) for scores_S_C, (name, part, rows) in zip(by_svm, parts, strict=True)},
@@ -226,7 +224,7 @@ def _label_values(
     samples: ReadingSamples, joint: Joint, choices: Choices, settings: MeasureSettings
 ) -> Iterator[Value]:
     """Yield Table III's numbers, by the share of the new concept in the pool."""
-    with_kernel = gpc_settings(settings, SCHEDULES[joint["kernel"]])
+    with_kernel = scheduled(settings.gpc, SCHEDULES[joint["kernel"]])
     for new_share in choices["new_share"]:
         registrations = like_the_training(samples.sets)
         task = make_task(registrations, NEW, settings.labels, *samples.axes, new_share=new_share)
@@ -245,18 +243,11 @@ def _label_values(
             metrics = {"labels_to_target": float(steps[last]["labels"]), "reached": float(any(hits))}
             metrics["final_accuracy"] = float(steps[-1]["accuracy"])
             if strategy == "bald_kmeans":  # passes over these labels, or all, to a new classifier's target accuracy
-                anew = StartedGPC(with_kernel, joint, *samples.axes, "epochs", NEW)
-                most = with_kernel.iterations
+                anew, most = StartedGPC(with_kernel, joint, *samples.axes, "epochs", NEW), with_kernel.iterations
                 looks = [*range(LOOK_EVERY, most, LOOK_EVERY), most]
                 metrics["epochs_at_target"], _ = passes_to(settings.target, anew, task, labeled[last], looks)
             for metric, value in metrics.items():
                 yield part_name("labels", joint | {"new_share": new_share}), strategy, metric, NEW, value
-
-
-def gpc_settings(settings: MeasureSettings, schedule: tuple[str, float, int]) -> GPCSettings:
-    """The paper's setting with a row of Table IV's kernel, rate and iterations."""
-    kernel, rate, iterations = schedule
-    return GPCSettings(**settings.gpc | {"kernel": kernel, "learning_rate": rate, "iterations": iterations})
 
 
 def _combinations(choices: Choices, names: Sequence[str]) -> Iterator[dict[str, Any]]:

@@ -7,23 +7,29 @@ import numpy as np
 
 from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import read_timings, write_predictions, write_timings
+from gpca.encoders import reduction
 from gpca.encoders.registry import EncoderSettings
 from gpca.errors import InputError
+from gpca.explainers.interface import Describing, answer_of
+from gpca.explainers.registry import explainer_entry
 from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.io.csv_file import write_csv
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.objects.canonical import ObjectClouds, write_objects
+from gpca.objects.source import data_files, resolve, surfaces
 from gpca.pairs.dataset import Registrations, read_embedding, read_instances_of
+from gpca.pairs.synthesis import RegistrationSettings, make_registrations, read_as
 from gpca.settings import fields_of, read_settings
+from gpca.uncertainty.designs import design_rows, evaluate_design
+from gpca.uncertainty.outcomes import Outcomes, read_seconds, write_seconds
+from gpca.uncertainty.settings import CONDITIONS, UncertaintySettings
 
 EARLIER = ("earlier_seconds", "earlier_icp_seconds")  # spent before an explainer starts
 
 
 def objects(job: Job) -> None:
     """Read a configured source's surfaces -> canonical clouds, ``objects/{source}.npz``."""
-    from gpca.objects.source import data_files, resolve, surfaces
-
     entry = resolve(job.settings, job.data_dir)
     declared = {"entry": entry, "surface_points": job.surface_points}
     splits = job.get("splits")
@@ -33,8 +39,6 @@ def objects(job: Job) -> None:
 
 def registrations(job: Job) -> None:
     """Perturb and align canonical clouds -> ``registrations/{source}/seed{seed}.npz``."""
-    from gpca.pairs.synthesis import RegistrationSettings, make_registrations
-
     settings = read_settings(RegistrationSettings, job.settings)
     objects = ObjectClouds.load(job.objects, job.source)
     with record_provenance([job.registrations, job.timings], [job.objects], job.settings, seed=job.seed):
@@ -45,10 +49,6 @@ def registrations(job: Job) -> None:
 
 def uncertainty(job: Job) -> None:
     """Run the conditions of a design by Monte-Carlo ICP, seed by seed -> ``uncertainty/{source}/{design}/``."""
-    from gpca.uncertainty.designs import design_rows, evaluate_design
-    from gpca.uncertainty.outcomes import write_seconds
-    from gpca.uncertainty.settings import CONDITIONS, UncertaintySettings
-
     own, icp = job.settings_and_icp()
     settings = UncertaintySettings(**fields_of(own, UncertaintySettings), icp=ICPSettings(**icp))
     for seed, registrations_path, out, table, timings in job.per_seed("registrations", "outcomes", "tables", "timings"):
@@ -66,7 +66,6 @@ def train(job: Job) -> None:
     import pandas as pd
 
     from gpca.encoders.training import load_model, train_encoder, write_weights
-    from gpca.pairs.synthesis import read_as
 
     of_encoder, of_icp = job.settings_and_icp()
     settings, icp = EncoderSettings(**of_encoder), ICPSettings(**of_icp)
@@ -95,7 +94,6 @@ def train(job: Job) -> None:
 def embed(job: Job) -> None:
     """Embed the registrations by an encoder -> ``embeddings/{source}/{backbone}/{reduction}/seed{seed}.npz``."""
     from gpca.encoders.training import embed, load_model
-    from gpca.pairs.synthesis import read_as
 
     of_encoder, of_icp = job.settings_and_icp()
     settings, icp = EncoderSettings(**of_encoder), ICPSettings(**of_icp)
@@ -119,24 +117,17 @@ EMBEDDING_KINDS = {"h": REAL, "head_logits": REAL, "sample": WHOLE, "split": TEX
 
 def reduce(job: Job) -> None:
     """Fit a reduction to the training rows of embeddings and reduce every row, seed by seed; all else is kept."""
-    from gpca.encoders.reduction import make_reduction, reduce
-
-    make_reduction(job.reduction, job.settings)
+    reduction.make_reduction(job.reduction, job.settings)
     for seed, embeddings, out in job.per_seed("embeddings", "out"):
         with record_provenance([out], [embeddings], job.settings, seed=seed):
             arrays = load_arrays(embeddings, EMBEDDING_SHAPES, EMBEDDING_KINDS, (job.source, seed))
             h_S_d, axes = arrays["h"], (job.source, seed, "reduction")
-            reduced_S_c = reduce(job.reduction, h_S_d[arrays["split"] == "train"], h_S_d, job.settings, *axes)
+            reduced_S_c = reduction.reduce(job.reduction, h_S_d[arrays["split"] == "train"], h_S_d, job.settings, *axes)
             save_arrays(out, {name: arrays[name] for name in EMBEDDING_SHAPES} | {"h": reduced_S_c}, (job.source, seed))
 
 
 def attribute(job: Job) -> None:
     """Fit an explainer to the training rows and explain every row, seed by seed -> predictions and timings."""
-    from gpca.explainers.interface import Describing, answer_of
-    from gpca.explainers.registry import explainer_entry
-    from gpca.uncertainty.outcomes import Outcomes, read_seconds
-    from gpca.uncertainty.settings import CONDITIONS
-
     entry = explainer_entry(job.explainer)
     names = ("registrations", "embeddings", "uncertainty", "uncertainty_timings", "input_timings")
     lists = [job.get(name, [None] * len(job.seeds)) for name in names]

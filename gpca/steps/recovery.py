@@ -48,8 +48,7 @@ ACTION = "new_view"  # that the example shows
 def run(job: Job) -> None:
     """Learn the classifier, rehearse, find failures and let every policy act on them."""
     settings = RecoverySettings.from_sections(job.settings)
-    recovery = settings.section
-    loop = settings.loop
+    recovery, loop = settings.section, settings.loop
     objects = resolve(dict(settings.objects), job.data_dir)
     actions = {name: action_of(name, of_action or {}) for name, of_action in recovery["actions"].items()}
     entries = [policy_entry(name, tuple(actions)) for name in recovery["policies"]]
@@ -79,9 +78,8 @@ def run(job: Job) -> None:
             means = replace(means, gate=closed_loop.rehearsed_gate(parts, recovery["gate"]["false_alarms"]))
         if any(entry.alarmed for entry in entries):
             fresh = [*registered["train"], *registered["test"], *rehearsed]  # of which it has learned nothing
-            means = replace(
-                means, alarm=closed_loop.calibrated_alarm(fresh, reenactor, recovery["gate"]["false_alarms"])
-            )
+            alarm = closed_loop.calibrated_alarm(fresh, reenactor, recovery["gate"]["false_alarms"])
+            means = replace(means, alarm=alarm)
         content = closed_loop.summary(means)
         print(json.dumps(content), file=sys.stderr)
         write_text(job.policy, json.dumps(content, indent=1, sort_keys=True) + "\n")

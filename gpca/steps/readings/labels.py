@@ -130,5 +130,4 @@ def classifiers(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Ro
 def label_settings(run_files: RunFiles) -> tuple[ActiveLearningSettings, RareSettings, float]:
     """Settings of the protocol, those of the row that is judged, in which the concept is rare; the target accuracy."""
     section = run_files.section("active_learning")
-    rare = read_settings(RareSettings, section.get("rare") or {})
-    return ActiveLearningSettings.from_dict(section), rare, section["target"]
+    return ActiveLearningSettings.from_dict(section), read_settings(RareSettings, section["rare"]), section["target"]

@@ -3,6 +3,8 @@
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 import torch
@@ -38,6 +40,7 @@ FEATURES = {
     "counts": slice(-1, None),
 }
 BATCH = 64  # samples of a minibatch
+Schedule = tuple[str, float, int]
 # Kernel, rate and iterations of the rows of Table IV whose numbers are missed, and of those that other tables show.
 FITTED = (("rbf", 0.001, 200), ("polynomial", 0.001, 200), ("rbf", 0.01, 100), ("matern32", 0.01, 200))
 SHOWN_AS = {("rbf", 0.01, 100): "gpca_paper", ("matern32", 0.01, 200): "gpca_matern"}  # in Tables I and II, and in V
@@ -100,17 +103,23 @@ def starts(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
         fitted: dict[tuple, np.ndarray] = {}
         for reading in progress(readings, f"starts of the GPC on {source}, seed {seed}"):
             for schedule in FITTED:
-                kernel, rate, iterations = schedule
-                key = (*schedule, *relevant(reading, kernel).values())
+                key = (*schedule, *relevant(reading, schedule[0]).values())
                 if key not in fitted:
-                    changes = {"kernel": kernel, "learning_rate": rate, "iterations": iterations}
-                    settings = GPCSettings(**run_files.section("gpca_paper") | changes)
+                    settings = scheduled(run_files.section("gpca_paper"), schedule)
                     gpc = StartedGPC(settings, reading, source, seed).fit(train.embedding, train.concept)
                     fitted[key] = gpc.attribute(test.embedding)[0]
-                values, method = accuracies(test.concept, fitted[key]), f"{kernel}-{rate:g}-{iterations}"
-                yield reading, source, method, seed, values
+                yield reading, source, method_of(schedule), seed, accuracies(test.concept, fitted[key])
                 if schedule in SHOWN_AS:
                     yield reading, source, SHOWN_AS[schedule], seed, table5(test.concept, fitted[key], distance_S)
+
+
+def scheduled(section: dict[str, Any], schedule: Schedule) -> GPCSettings:
+    """The paper's setting with a row of Table IV's kernel, rate and iterations."""
+    return GPCSettings(**section | dict(zip(("kernel", "learning_rate", "iterations"), schedule, strict=True)))
+
+
+def method_of(schedule: Schedule) -> str:
+    return "{}-{:g}-{}".format(*schedule)
 
 
 def relevant(reading: Reading, kernel: str) -> Reading:
@@ -153,15 +162,12 @@ def svm_scores(train: Registrations, h_S_d: np.ndarray, machine: str, inputs: st
     from sklearn.preprocessing import FunctionTransformer, StandardScaler
     from sklearn.svm import SVC, LinearSVC
 
-    svm = {
-        "svc": SVC(kernel="linear", random_state=PAPERS_RANDOM_STATE),
-        "linear_svc": LinearSVC(random_state=PAPERS_RANDOM_STATE),
-    }[machine]
+    make = {"svc": partial(SVC, kernel="linear"), "linear_svc": LinearSVC}[machine]
+    svm = make(random_state=PAPERS_RANDOM_STATE)
     if probability == "platt":
         folds = min(5, *np.unique(train.concept, return_counts=True)[1])
         svm = CalibratedClassifierCV(svm, cv=folds, ensemble=False)
-    scaling = StandardScaler() if inputs == "standardised" else FunctionTransformer()
-    fitted = make_pipeline(scaling, svm)
+    fitted = make_pipeline(StandardScaler() if inputs == "standardised" else FunctionTransformer(), svm)
     with warnings.catch_warnings():  # scikit-learn's defaults stop before a LinearSVC on raw inputs has converged
         warnings.simplefilter("ignore")
         fitted.fit(np.asarray(train.embedding, float), train.concept)

@@ -8,6 +8,8 @@ import numpy as np
 from gpca.attribution.predictions import read_predictions
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
+from gpca.encoders.registry import EncoderSettings
+from gpca.encoders.training import embedding_by, train_encoder
 from gpca.evaluation.intervals import mean_ranks
 from gpca.evaluation.measures import ALL
 from gpca.jobs.job import Job
@@ -23,6 +25,7 @@ from gpca.settings import read_settings
 from gpca.steps.readings.files import Row, RunFiles, accuracies, accuracies_of_named, like_the_training, train_and_test
 from gpca.steps.readings.groups import Reading
 from gpca.steps.readings.learners import gpc_scores
+from gpca.steps.shift import ShiftSettings, make_sets
 
 THIRDS = ("weakest", "middle", "strongest")
 CLASSIFIERS = {"paper": "gpca_paper", "converged": "gpca"}
@@ -69,10 +72,6 @@ def retrained(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]
 
 def retrain(job: Job) -> None:
     """Make the sets of samples within other severities, from the random numbers of the protocol."""
-    from gpca.encoders.registry import EncoderSettings
-    from gpca.encoders.training import embedding_by, train_encoder
-    from gpca.steps.shift import ShiftSettings, make_sets
-
     parts = {name: job.section(name) for name in ("shift", "registrations", "encoder")}
     settings, encoder_settings = ShiftSettings.from_dicts(**parts), EncoderSettings(**parts["encoder"])
     checkpoint = job.out.with_suffix(".checkpoint")  # no output of the rule: a rerun continues from it
