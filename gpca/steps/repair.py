@@ -105,42 +105,40 @@ class Attempts(Container):
 
 def attempt(job: Job) -> None:
     """Ask about the test registrations of a file of causes; scans and frames bring samples and re-enactments."""
-    settings, axes = read_settings(RepairSettings, job.section("repair")), job.axes
+    import pandas as pd
+
+    settings = read_settings(RepairSettings, job.section("repair"))
     truth = CauseSettings.from_dict(job.section("causes"), job.section("icp"))
     reenactment = read_settings(ReenactmentSettings, job.section("reenactment"))
-    optional = {name: job.get(name) for name in ("objects", "samples", "reenactments")}
-    inputs = [job.causes, *(path for path in optional.values() if path)]
+    objects, samples, enacted = (job.get(name) for name in ("objects", "samples", "reenactments"))
+    inputs = [job.causes, *filter(None, (objects, samples, enacted))]
     with record_provenance([job.attempts, job.timings], inputs, job.settings, seed=job.seed):
-        causes = Causes.load(job.causes, axes)
-        about = read_csv(path := optional["samples"], ("sample",), others=ANY) if optional["samples"] else None
-        read = Reenactments.load(optional["reenactments"], causes.registrations) if optional["reenactments"] else None
+        causes = Causes.load(job.causes, job.axes)
+        numbered = pd.DataFrame({"sample": causes.registrations.sample})
+        about = read_csv(samples, ("sample",), others=ANY) if samples else numbered
         rows = causes.rows("test")
-        if about is not None and "times" in about:  # scans with added noise are left out
-            rows = rows[(numbers(path, about, "times") == 0).to_numpy()[rows]]
-        if about is not None and "truth" in about:
+        if "times" in about:  # scans with added noise are left out
+            rows = rows[(numbers(samples, about, "times") == 0).to_numpy()[rows]]
+        if "truth" in about:
             rows = rows[(about["truth"] != BY_ICP).to_numpy()[rows]]
-        rows = np.sort(generator(*axes, "repair", "samples").permutation(rows)[: settings.samples])
+        rows = np.sort(generator(*job.axes, "repair", "samples").permutation(rows)[: settings.samples])
         if not len(rows):
             raise InputError(job.causes, "has no registration to repair", "raise its number of test samples")
-        asked = causes.subset(rows)
-        if about is not None:
-            about = about.iloc[rows].reset_index(drop=True)
-        moved = OBSERVED if about is not None and "error_factor" in about else truth.moved
-        world = World(asked, about, optional["objects"] and ObjectClouds.load(optional["objects"], job.source))
-        weight_K, T_K = (None, None) if read is None else (read.weight[rows], read.T_model_observed[rows])
+        about = about.iloc[rows].reset_index(drop=True)
+        read = Reenactments.load(enacted, causes.registrations).subset(rows) if enacted else None
+        moved = OBSERVED if "error_factor" in about else truth.moved
+        world = World(causes.subset(rows), about, objects and ObjectClouds.load(objects, job.source))
 
         def hypotheses(pair: ObservedPair, row: int) -> tuple[np.ndarray, np.ndarray]:
-            if T_K is not None and weight_K is not None:
-                return T_K[row], weight_K[row]
-            return searched(pair, reenactment)
+            return (read.T_model_observed[row], read.weight[row]) if read is not None else searched(pair, reenactment)
 
-        attempts, seconds = try_all(asked, world, settings, truth.icp, moved, hypotheses, axes)
-        attempts.save(job.attempts, axes)
+        attempts, seconds = try_all(world, settings, truth.icp, moved, hypotheses, job.axes)
+        attempts.save(job.attempts, job.axes)
         write_csv(job.timings, seconds)
 
 
 class World:
-    """What is known of registrations for judging poses of them; scans have no object."""
+    """What is known of registrations for judging poses of them: columns of their samples; scans have no object."""
 
     def __init__(self, causes: Causes, about: Any, objects: ObjectClouds | None) -> None:
         self.causes, self.about = causes, about
@@ -159,7 +157,7 @@ class World:
         """The columns of :class:`Attempts` that say what the registrations are."""
         causes, registrations = self.causes, self.causes.registrations
         count, cluster_N, group_N = len(causes), registrations.cluster, np.full(len(causes), "all")
-        if self.about is not None and "dataset" in self.about:
+        if "dataset" in self.about:
             cluster_N = (self.about["dataset"] + " " + self.about["scene"].astype(str)).to_numpy(str)
             group_N = self.about["start"].to_numpy(str)
         named_N = labels_of(causes.truth)
@@ -170,6 +168,8 @@ class World:
             "cluster_N": cluster_N,
             "label_N": np.where(np.isin(named_N, CONCEPTS), named_N, "none"),
             "points_N": np.array(sizes),
+            "start_error_N": np.array([self.errors(row, np.eye(4)[None])[0] for row in range(count)]),
+            "family_N": registrations.cluster,
         }
 
 
@@ -181,7 +181,6 @@ def searched(pair: ObservedPair, settings: ReenactmentSettings) -> tuple[np.ndar
 
 
 def try_all(
-    causes: Causes,
     world: World,
     settings: RepairSettings,
     icp: ICPSettings,
@@ -194,16 +193,15 @@ def try_all(
     import pandas as pd
 
     methods, functions = {name: make_method(name, entry) for name, entry in settings.methods.items()}, functions or {}
-    proposals, errors, start_errors, columns, seconds = [], [], [], [], []
-    registrations = causes.registrations
-    for row in progress(range(len(causes)), f"repairs of {axes[0]}, seed {axes[1]}"):
-        pair = observed_pair(causes, row, *axes, "reenactment")
+    proposals, errors, columns, seconds = [], [], [], []
+    registrations = world.causes.registrations
+    for row in progress(range(len(registrations)), f"repairs of {axes[0]}, seed {axes[1]}"):
+        pair = observed_pair(world.causes, row, *axes, "reenactment")
         started = perf_counter()
         T_K, weight_K = hypotheses(pair, row)
         surface = ModelSurface(pair.model)
         proposals.append(propose_for(pair, T_K, weight_K, icp, moved, surface))
         errors.append(world.errors(row, proposals[-1].T_n))
-        start_errors.append(world.errors(row, np.eye(4)[None])[0])
         rival = Rivals(pair, surface, icp, settings.points, proposals[-1], perf_counter() - started)
         tried = rival.built_in()
         tried |= {name: rival.by(name, method, warm=row == 0) for name, method in methods.items()}
@@ -219,17 +217,9 @@ def try_all(
     *of_rivals, score_N_M_Q = map(np.array, zip(*columns, strict=True))
     of_proposals = joined(proposals, errors, registrations.cluster).arrays.values()  # the last is no column's
     names = [name for name in Attempts.array_fields() if "_N_C" in name]
-    columns_N_C: dict[str, Any] = {
-        name: np.hstack(pair) for name, *pair in zip(names, of_proposals, of_rivals, strict=False)
-    }
-    attempts = Attempts(
-        **world.columns,
-        start_error_N=np.array(start_errors),
-        **columns_N_C,
-        family_N=registrations.cluster,
-        score_N_M_Q=score_N_M_Q,
-        method_M=np.array([*tried]),
-    )
+    pairs = zip(names, of_proposals, of_rivals, strict=False)
+    columns_N_C: dict[str, Any] = {name: np.hstack(both) for name, *both in pairs}
+    attempts = Attempts(**world.columns, **columns_N_C, score_N_M_Q=score_N_M_Q, method_M=np.array([*tried]))
     return attempts, pd.DataFrame(seconds, columns=["sample", "method", "seconds"])
 
 
@@ -276,9 +266,9 @@ class Rivals:
             method(pair.with_normals())
         started = perf_counter()
         outcome = method(pair.with_normals())
-        refined = self.registrar.register(self.before, outcome.T_target_source[None])[0]
-        T = self._best(np.concatenate([outcome.T_target_source[None], refined]))
-        return self._tried(started, T, failed=not outcome.converged)
+        found_1 = outcome.T_target_source[None]
+        refined_1 = self.registrar.register(self.before, found_1)[0]
+        return self._tried(started, self._best(np.concatenate([found_1, refined_1])), failed=not outcome.converged)
 
     def by_function(self, name: str, function: Own) -> Tried:
         """Return the pose of a function of observed cloud, model and initial pose, whose doubt is its negative

@@ -54,11 +54,10 @@ def repair_table(samples: TrackSamples, function: Own, name: str) -> Table:
         causes = Causes.load(causes_path, axes)
         tested = causes.subset(causes.rows("test"))
         causes = tested.subset(np.flatnonzero(np.isin(tested.registrations.sample, others.sample_N)))
-        world = World(causes, None, ObjectClouds.load(objects_path, source))
+        world = World(causes, {}, ObjectClouds.load(objects_path, source))
         alone, spent = try_all(
-            causes, world, asked, truth.icp, truth.moved, lambda pair, _row: searched(pair, reenactment), axes,
-            {name: function},
-        )  # fmt: skip
+            world, asked, truth.icp, truth.moved, lambda pair, _row: searched(pair, reenactment), axes, {name: function}
+        )
         files.append((source, seed, beside(others, alone)))
         seconds.append(spent.assign(source=source, seed=seed))
     intervals = measured(verdicts({CAUSES: files}, config["success"]["error"]))

@@ -23,13 +23,11 @@ HYPOTHESES = ReenactmentSettings(hypotheses=2)
 def ask(causes, four):
     """A function that asks functions about three registrations."""
     tested = causes.subset(causes.rows("test")[:3])
-    world = World(tested, None, four)
+    world = World(tested, {}, four)
 
     def asked(functions):
         found = lambda pair, _row: searched(pair, HYPOTHESES)  # noqa: E731
-        return tested, *try_all(
-            tested, world, RepairSettings(), ICPSettings(), "model", found, ("four", 100), functions
-        )
+        return tested, *try_all(world, RepairSettings(), ICPSettings(), "model", found, ("four", 100), functions)
 
     return asked
 

@@ -76,8 +76,8 @@ def test_a_function_stands_among_the_repairs_even_if_it_is_named_like_one(
     registrations = replace(few.registrations, split=np.full(len(few), "test"), axes=(SOURCE, SEED))
     few = replace(few, registrations=registrations, truth_again=few.truth)
     found = lambda pair, _row: searched(pair, ReenactmentSettings())  # noqa: E731
-    world = World(few, None, four)
-    attempts, _ = try_all(few, world, RepairSettings(), ICPSettings(), "model", found, (SOURCE, SEED))
+    world = World(few, {}, four)
+    attempts, _ = try_all(world, RepairSettings(), ICPSettings(), "model", found, (SOURCE, SEED))
     few.save(tmp_path / FILE)
     four.save(tmp_path / f"objects/{SOURCE}.npz", SOURCE)
     attempts.save(tmp_path / f"repairs/{FILE}", (SOURCE, SEED))
