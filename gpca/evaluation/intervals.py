@@ -68,14 +68,10 @@ def interval(
     level: float = LEVEL,
     samples: int | None = None,
 ) -> Estimate:
-    """Value and interval of a statistic.
+    """Value and interval of a statistic (1 + B,) of the samples themselves, then of every draw; NaN where undefined.
 
-    Args:
-        value_B: (1 + B,) the statistic of the samples themselves, then of every draw; NaN where it is undefined.
-        drawn_B_N: (B, N) for a share: how often each draw contains each of its N samples. Without it, the interval is
-            that of the bootstrap alone.
-        difference: the statistic is a difference of two shares of the same samples.
-        samples: the number of independent ones, where a column of `drawn_B_N` is not one of them.
+    For a share, or the difference of two shares of the same samples, `drawn_B_N` says how often each draw contains each
+    of its N samples, and `samples` how many are independent, if not all N. Else the interval is the bootstrap's alone.
     """
     value, (low, high) = float(value_B[0]), quantile_bounds(value_B[1:], level)
     if drawn_B_N is None or np.isnan(low):

@@ -41,11 +41,6 @@ def page_comparison(path: str | Path) -> dict | None:
     }
 
 
-def number_of(row: Mapping[str, str]) -> tuple[str, str, str]:
-    """Return the names of a printed number: table, row and column."""
-    return row["table"], row["row"], row["column"]
-
-
 def _rows(path: str | Path) -> list[dict[str, str]]:
     """Return the entries as printed; texts stay as they are."""
     rows = []

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from gpca.errors import InputError, refusing
 from gpca.io.files import require_file, sha256_of_file, write_text
 from gpca.jobs.provenance import read_record
-from gpca.page.comparison import number_of, page_comparison
+from gpca.page.comparison import page_comparison
 from gpca.page.page import read_provenance, render
 
 SAME, DIFFERENT, APART, ALONE = "same", "different", "apart", "alone"  # kinds of a cell of both runs
@@ -190,4 +190,4 @@ def _recorded(folder: Path) -> tuple[dict[str, dict[str, int]], dict[str, frozen
             hashes[section] = hashes.get(section, frozenset()) | {digest}
     compared = page_comparison(folder / "comparison.csv")
     rows = [row for table in (compared["tables"] if compared else ()) for row in table["rows"]]
-    return read_provenance(files), hashes, {number_of(row): row for row in rows}
+    return read_provenance(files), hashes, {(row["table"], row["row"], row["column"]): row for row in rows}

@@ -64,11 +64,10 @@ class ReadingSamples:
         pairs, _ = make_registrations(ObjectClouds.load(job.objects, job.source), *axes, few)
         return cls(ShiftedSets.load(sets, axes), pairs, axes)
 
-    def test_sets(self) -> Iterator[tuple[str, Registrations, np.ndarray]]:
-        """Name, test samples and their rows of the sets whose samples are embedded by the encoder itself."""
-        for name in ("in_distribution", "severity"):
-            rows = self.sets.rows(name, "test")
-            yield name, self.sets.registrations(rows), rows
+    def test_sets(self) -> dict[str, Registrations]:
+        """Test samples of the sets whose samples are embedded by the encoder itself."""
+        names = ("in_distribution", "severity")
+        return {name: self.sets.registrations(self.sets.rows(name, "test")) for name in names}
 
 
 @dataclass(frozen=True)
@@ -171,7 +170,7 @@ def values(samples: ReadingSamples, severities: str, choices: Choices, settings:
             for (metric, concept), value in right.items():
                 yield part_name("classifier", joint), "gpca_paper", metric, concept, value
             yield part_name("classifier", joint), "gpca_matern", "accuracy", ALL, right["accuracy", ALL]
-            scored = {name: (gpc.attribute(part.embedding)[0], part, rows) for name, part, rows in samples.test_sets()}
+            scored = {name: gpc.attribute(part.embedding)[0] for name, part in samples.test_sets().items()}
             yield from _diagnostics("diagnostics", "gpca_matern", scored, samples.sets, joint, choices)
             yield from _label_values(samples, joint, choices, settings)
 
@@ -187,37 +186,32 @@ def _learner_values(samples: ReadingSamples, choices: Choices) -> Iterator[Value
         train = scaled(train_and_test(like_the_training(samples.sets))[0])
         forest = explainer_entry(FOREST).make(*samples.axes)
         forest.fit(train)
-        parts = [(name, scaled(part), rows) for name, part, rows in samples.test_sets()]
-        h_S_d = np.concatenate([part.embedding for _, part, _ in parts])
-        ends = np.cumsum([len(part) for _, part, _ in parts])[:-1]
+        parts = {name: scaled(part) for name, part in samples.test_sets().items()}
+        h_S_d = np.concatenate([part.embedding for part in parts.values()])
+        ends = np.cumsum([len(part) for part in parts.values()])[:-1]
         inputs = joint["inputs"] if joint["inputs"] == "standardised" else "raw"
         by_svm = np.split(learners.svm_scores(train, h_S_d, "svc", inputs, "platt"), ends)
         scored_by = {
-            FOREST: {name: (forest.explain(part).scores_N_C, part, rows) for name, part, rows in parts},
-            SVM: {name: (scores_S_C, part, rows) for scores_S_C, (name, part, rows) in zip(by_svm, parts, strict=True)},
+            FOREST: {name: forest.explain(part).scores_N_C for name, part in parts.items()},
+            SVM: dict(zip(parts, by_svm, strict=True)),
         }
         for method, scored in scored_by.items():
-            scores_S_C, part, _ = scored["in_distribution"]
-            right = accuracies(part.concept, scores_S_C)["accuracy", ALL]
+            right = accuracies(parts["in_distribution"].concept, scored["in_distribution"])["accuracy", ALL]
             yield part_name("learners", joint), method, "accuracy", ALL, right
             yield from _diagnostics("learner_diagnostics", method, scored, samples.sets, joint, choices)
 
 
 def _diagnostics(
-    part: str,
-    method: str,
-    scored: Mapping[str, tuple[np.ndarray, Registrations, np.ndarray]],
-    sets: ShiftedSets,
-    joint: Joint,
-    choices: Choices,
+    part: str, method: str, scored: Mapping[str, np.ndarray], sets: ShiftedSets, joint: Joint, choices: Choices
 ) -> Iterator[Value]:
-    """Yield ρ, AUC and ECE by set and distance, given scores, samples and rows of each set."""
+    """Yield ρ, AUC and ECE by set and distance, given the scores of each set's test samples."""
     for asked in _combinations(choices, ("set", "distance")):
-        scores, samples, rows = zip(*(scored[name] for name in asked["set"].split("+")), strict=True)
-        concept_S = np.concatenate([each.concept for each in samples])
-        distance_S = sets.distance[np.concatenate(rows), DISTANCES.index(asked["distance"])]
-        for metric, value in diagnostics_of_scores(concept_S, np.concatenate(scores), distance_S).items():
-            yield part_name(part, joint | asked), method, metric, ALL, value
+        names = asked["set"].split("+")
+        rows = np.concatenate([sets.rows(name, "test") for name in names])
+        scores_S_C = np.concatenate([scored[name] for name in names])
+        distance_S = sets.distance[rows, DISTANCES.index(asked["distance"])]
+        for (metric, concept), value in diagnostics_of_scores(sets.concept[rows], scores_S_C, distance_S).items():
+            yield part_name(part, joint | asked), method, metric, concept, value
 
 
 def _label_values(

@@ -21,7 +21,8 @@ from gpca.steps.repair import REPAIR, TESTS, Attempts
 CAUSES, HARD = "causes", "hard"  # tracks whose families judges and limits come from; and that share these
 JUDGED = "judged"  # after a rival's name: its pose is accepted by the judge
 FALSE_ALARMS = 0.05  # share of the good registrations of other families that are called failed
-NAMED = ("track", "source", "seed", "sample", "group", "cluster", "label", "points", "start_error", "method")
+OF_SAMPLE = ("sample", "group", "cluster", "label", "points", "start_error")
+NAMED = ("track", "source", "seed", *OF_SAMPLE, "method")
 COLUMNS = ("failed", "called", "replaced", "right", "right_pose", "several")
 SCORE = "score"  # by which a pose is accepted; the smaller, the surer
 
@@ -45,16 +46,15 @@ def verdicts(attempts: Mapping[str, Sequence[tuple[str, int, Attempts]]], tolera
         limits = learn_limits(learned.subset(seen), tolerance)
         limits_of |= dict.fromkeys(learned.family_N[unseen].tolist(), limits)
     every = learn_limits(learned, tolerance)
-    frames = []
+    records = []
     for track, files in attempts.items():
         for source, seed, each in files:
             for row, family in enumerate(each.family_N.tolist()):
                 limits = limits_of.get(family, every) if track in (CAUSES, HARD) else every
                 for method, outcome in decided(each, row, limits, tolerance):
-                    named = (track, source, seed, each.sample_N[row], each.group_N[row], each.cluster_N[row])
-                    described = each.label_N[row], each.points_N[row], each.start_error_N[row], method
-                    frames.append((*named, *described, *outcome))
-    return pd.DataFrame(frames, columns=[*NAMED, *COLUMNS, SCORE])
+                    described = (getattr(each, f"{name}_N")[row] for name in OF_SAMPLE)
+                    records.append((track, source, seed, *described, method, *outcome))
+    return pd.DataFrame(records, columns=[*NAMED, *COLUMNS, SCORE])
 
 
 def learn_limits(learned: Attempts, tolerance: float) -> Limits:

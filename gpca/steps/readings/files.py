@@ -129,16 +129,15 @@ def accuracies_of_named(true_S: np.ndarray, named_S: np.ndarray) -> Values:
 
 def table5(true_S: np.ndarray, scores_S_C: np.ndarray, distance_S: np.ndarray) -> Values:
     """Accuracies and the diagnostics of Table V."""
-    values = diagnostics_of_scores(true_S, scores_S_C, distance_S)
-    return accuracies(true_S, scores_S_C) | {(name, ALL): value for name, value in values.items()}
+    return accuracies(true_S, scores_S_C) | diagnostics_of_scores(true_S, scores_S_C, distance_S)
 
 
-def diagnostics_of_scores(true_S: np.ndarray, scores_S_C: np.ndarray, distance_S: np.ndarray) -> dict[str, float]:
+def diagnostics_of_scores(true_S: np.ndarray, scores_S_C: np.ndarray, distance_S: np.ndarray) -> Values:
     """ρ, AUC and ECE of the uncertainty 1 - max ŝ."""
     target_S = np.array([CONCEPTS.index(concept) for concept in true_S])
     confidence_S = scores_S_C.max(axis=1)
     return {
-        "rho_max_score_knn_analytical": rank_correlation(1 - confidence_S, distance_S),
-        "aurc_max_score": aurc(confidence_S, scores_S_C.argmax(axis=1) != target_S),
-        "ece": calibration_error(scores_S_C, target_S),
+        ("rho_max_score_knn_analytical", ALL): rank_correlation(1 - confidence_S, distance_S),
+        ("aurc_max_score", ALL): aurc(confidence_S, scores_S_C.argmax(axis=1) != target_S),
+        ("ece", ALL): calibration_error(scores_S_C, target_S),
     }
