@@ -1,11 +1,8 @@
 """95 % intervals: by the pigeonhole bootstrap over clusters and seeds, Wilson's, and Student's over seeds.
 
 The pigeonhole bootstrap (Owen 2007) draws clusters (families of objects, scenes, rendered tables) and seeds with
-replacement and weights a sample by the product of the two counts. A share has the farther bounds of it and of Wilson's
-interval for independent samples, because few clusters may agree by chance; an instance that counts once in the share,
-whatever its number of starts, is one of them. Where all draws agree, Wilson's interval counts a cluster once in each
-seed. Differences are :func:`corrected`. docs/comparison.md states this rule, benchmarks/intervals.py checks its
-coverage.
+replacement and weights a sample by the product of the two counts. docs/comparison.md and docs/appendix.md state which
+value has which interval, benchmarks/intervals.py checks their coverage.
 """
 
 from __future__ import annotations
@@ -33,10 +30,7 @@ TRIVIAL = (*WITHOUT_TRAINING, "rule_fitted", "tree_trivial", "logistic_trivial",
 
 
 def mean_ranks(values_N: np.ndarray) -> np.ndarray:
-    """Return the ranks (N,) from 1 on, equal values sharing their mean; all are NaN beside a NaN.
-
-    They are those of scipy.stats, whose import takes a second.
-    """
+    """Return the ranks (N,) of scipy.stats, whose import takes a second; equal values share their mean."""
     if np.isnan(values_N).any():
         return np.full(len(values_N), np.nan)
     sorted_N = np.sort(values_N)
@@ -142,8 +136,6 @@ def independent(drawn_B_N: np.ndarray) -> int:
 
 def wilson_interval(successes: float, trials: int, level: float = LEVEL) -> tuple[float, float]:
     """Score interval of a share (Wilson 1927), in [0, 1]; successes may be fractional, unlike SciPy's."""
-    if trials < 1:
-        raise ValueError("interval of no trials")
     z = NormalDist().inv_cdf((1 + level) / 2)
     share = successes / trials
     center = share + z**2 / (2 * trials)
@@ -161,18 +153,14 @@ def student_factor(repeats: int, level: float = LEVEL) -> float:
 
 
 def mean_interval(values_R: Iterable[float], level: float = LEVEL) -> Estimate:
-    """Mean of R repeats and the bounds of its Student t-interval, mean ± t_{R-1} s / √R, not clipped.
-
-    One repeat has NaN bounds; a NaN repeat makes all three NaN; none raises ValueError.
-    """
+    """Mean of R repeats and its Student t-interval, mean ± t_{R-1} s / √R, not clipped; one repeat has NaN bounds."""
     values_R = np.asarray(list(values_R), dtype=float)
     if values_R.size == 0:
         raise ValueError("interval of no repeats")
     mean = float(values_R.mean())
     if values_R.size == 1:
         return Estimate(mean, np.nan, np.nan)
-    standard_error = values_R.std(ddof=1) / np.sqrt(values_R.size)
-    half_width = float(student_factor(values_R.size, level) * standard_error)
+    half_width = float(student_factor(values_R.size, level) * (values_R.std(ddof=1) / np.sqrt(values_R.size)))
     return Estimate(mean, mean - half_width, mean + half_width)
 
 

@@ -9,7 +9,6 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from gpca.errors import InputError
 from gpca.io.files import write_text
 from gpca.jobs.provenance import RECORD
 
@@ -43,8 +42,6 @@ def read_jobs(folder: Path) -> list[dict[str, Any]]:
     paths_of = defaultdict(list)  # a job left the same record beside each of its outputs
     for path in sorted(folder.rglob(f"*{RECORD}")):
         paths_of[path.read_bytes()].append(path)
-    if not paths_of:
-        raise InputError(folder, f"has no *{RECORD}", "name the folder of a finished run")
     jobs = []
     for text, paths in paths_of.items():
         if folder / f"{NAME}{RECORD}" not in paths:

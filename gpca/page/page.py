@@ -18,7 +18,6 @@ from gpca.model.scene import ASSETS
 from gpca.page.comparison import page_comparison
 from gpca.page.findings import Titles, findings_of
 from gpca.page.samples import POINTS, RULE, cause_samples
-from gpca.reporting.registry import SUFFIXES
 
 TEMPLATES = Path(__file__).parent / "templates"
 KEY_FIGURES = ("causes_example", "fig2_overview")  # the first of these that the run has opens the page
@@ -64,18 +63,12 @@ class FinishedRun:
     causes: Mapping[str, Mapping[str, str]]  # source -> files for :func:`cause_samples`
     titles: Titles  # of the explainers
     config: Mapping  # the whole configuration
-    command: str  # that makes what is missing
 
 
 def write_page(folder: str | Path, run: FinishedRun) -> None:
     """Write ``index.html`` of a finished run into its folder ``results/{run}``."""
     folder = Path(folder)
     sample_files = [Path(path) for files in run.causes.values() for path in files.values()]
-    needed = [f"{each.kind}/{each.name}.{suffix}" for each in run.results for suffix in SUFFIXES[each.kind]]
-    missing = [name for name in needed if not (folder / name).is_file()]
-    missing += [str(path) for path in sample_files if not path.is_file()]
-    if missing:
-        raise InputError(folder, f"lacks {', '.join(missing)}", f"make them with '{run.command}'")
     shown = {result.name: result for result in run.results}
     links = Links(folder, shown)
     content = {name: _content(folder, result, run, links) for name, result in shown.items()}

@@ -9,7 +9,6 @@ import numpy as np
 
 from gpca.alignment.icp import ICPSettings
 from gpca.encoders.registry import OF_ANY_SIZE, EncoderSettings
-from gpca.errors import InputError
 from gpca.io.arrays import save_arrays
 from gpca.io.csv_file import write_csv
 from gpca.jobs.job import Job
@@ -19,7 +18,7 @@ from gpca.objects.surface import instance_of
 from gpca.pairs.dataset import Registrations, ragged
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator
-from gpca.settings import Bounds, Count, Distinct, read_settings
+from gpca.settings import Bounds, Count, Distinct, read_settings, require_ascending
 
 PAPER = "paper"  # the protocol itself, which every control is compared with
 Control = Literal["density", "unseen_objects", "hard", "reversed", "label_noise_30", "shuffled", "transfer"]
@@ -50,9 +49,7 @@ class ControlSettings:
     hard_sources: Distinct[str] = ()  # that have hard samples
 
     def __post_init__(self) -> None:
-        if self.draw_points[0] > self.draw_points[1]:
-            fault = f"{list(self.draw_points)} is in descending order"
-            raise InputError("setting draw_points of controls", fault, "swap the two")
+        require_ascending("controls ", self, "draw_points")
 
 
 def left_out(control: str, registrations: Registrations, settings: ControlSettings, backbone: str) -> str | None:

@@ -150,10 +150,9 @@ class Exchange:
                 scores_S_C, abstained_S = np.zeros((len(test), len(CONCEPTS))), np.ones(len(test), bool)
                 estimated = np.flatnonzero(failure_S == "")
                 if len(estimated):
-                    attributed = answer_of(
-                        explainer, test_estimates.attach_to(test.without_labels(), estimated, conditions, floor)
-                    )
-                    scores_S_C[estimated], abstained_S[estimated] = attributed.scores_N_C, attributed.abstained_N
+                    asked = test_estimates.attach_to(test.without_labels(), estimated, conditions, floor)
+                    answer = answer_of(explainer, asked)
+                    scores_S_C[estimated], abstained_S[estimated] = answer.scores_N_C, answer.abstained_N
                 attribution = Attribution.of_scores(CONCEPTS, scores_S_C, abstained_N=abstained_S)
                 labels = dict(zip(LABELS, (ESTIMATOR, estimator, estimator, name), strict=True))
                 yield prediction_frame(test, attribution, **labels).assign(**{FAILURE: failure_S})

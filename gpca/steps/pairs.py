@@ -159,9 +159,6 @@ def attribute(job: Job) -> None:
                 explainer.fit(replace(registrations, attached=observed.attached).subset(train))
             attribution = answer_of(explainer, observed)
             write_predictions(predictions, registrations, attribution)
-            write_timings(
-                timings,
-                registrations,
-                registrations.attached[EARLIER[0]] + describing_seconds + attribution.seconds_N,
-                registrations.attached[EARLIER[1]] + attribution.icp_seconds_N,
-            )
+            seconds_S, icp_seconds_S = (registrations.attached[name] for name in EARLIER)
+            seconds_S = seconds_S + describing_seconds + attribution.seconds_N
+            write_timings(timings, registrations, seconds_S, icp_seconds_S + attribution.icp_seconds_N)

@@ -276,9 +276,8 @@ class Rivals:
         started = perf_counter()
         answer = function(self.before.copy(), self.pair.model.copy(), np.eye(4))
         if isinstance(answer, tuple) and len(answer) != 2:
-            raise InputError(
-                f"function {name}", f"returns {len(answer)} things", "return a pose, or it and a confidence"
-            )
+            remedy = "return a pose, or it and a confidence"
+            raise InputError(f"function {name}", f"returns {len(answer)} things", remedy)
         T, confidence = answer if isinstance(answer, tuple) else (answer, 0.0)
         if T is None:
             return self._tried(started, inverse(self.pair.T_init), failed=True)

@@ -136,19 +136,6 @@ def test_records_of_provenance_are_counted(tmp_path):
     assert device.endswith(", a GPU")
 
 
-def test_an_incomplete_folder_names_all_that_is_missing_and_the_command(copied):
-    folder, run = copied
-    for name in ("tables/table4_mine.md", "figures/reliability.pdf", "causes/four/seed100.npz"):
-        (folder / name).unlink()
-    with pytest.raises(InputError) as caught:
-        write_page(folder, run)
-    assert str(caught.value) == (
-        f"{folder}: lacks tables/table4_mine.md, figures/reliability.pdf, "
-        f"{folder / 'causes/four/seed100.npz'}; make them with 'snakemake -j2 results/tiny/index.html'"
-    )
-    assert not (folder / "index.html").exists()
-
-
 @pytest.mark.parametrize(
     ("damaged", "text", "fault"),
     [("tiny/comparison.csv", "", "is empty"), ("tiny/causes/four/seed100.npz", "PK", "is not a readable npz archive")],

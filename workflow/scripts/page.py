@@ -21,7 +21,6 @@ with workflow_script(snakemake):
         causes=causes,
         titles=Titles(**given.titles),
         config=given.config,
-        command=f"snakemake -j2 {snakemake.output.page}",
     )
     folder = Path(snakemake.output.page).parent
     write_page(folder, run)
