@@ -120,23 +120,21 @@ def model(job: Job) -> None:
         settings, recovery = EncoderSettings(**job.section("encoder")), job.section("recovery")
         registrations = Registrations.load(job.registrations, job.axes)
         h_S_d, train = read_embedding(job.embeddings, registrations)["embedding"], registrations.rows("train")
+        gpc = GPC(CONCEPTS, GPCSettings(**job.section("gpc")), *job.axes)
         policy = RecoveryPolicy()
         if recovery:
             thresholds, treatments, budget = recovery["thresholds"], recovery["treatments"], recovery["loop"]["budget"]
             policy = RecoveryPolicy.of_settings(thresholds, treatments, budget, bald_N)
+        clouds = ((registrations.cloud(row).astype(float), registrations.target(row).astype(float)) for row in train)
         Model(
             diagnoser=diagnoser,
             encoder=TrainedEncoder.of(load_model(job.encoder, settings, axes=job.axes).encoder, settings),
-            gpc=GPC(CONCEPTS, GPCSettings(**job.section("gpc")), *job.axes).fit(
-                h_S_d[train], registrations.concept[train]
-            ),
+            gpc=gpc.fit(h_S_d[train], registrations.concept[train]),
             icp=ICPSettings(**icp),
             cloud_points=job.section("registrations").get("cloud_points", 2048),
             policy=policy,
             title=job.title,
             stand_in=job.get("stand_in"),
             learned_from=tuple(job.get("learned_from", ())),
-            familiar=Familiarity.of(
-                (registrations.cloud(row).astype(float), registrations.target(row).astype(float)) for row in train
-            ),
+            familiar=Familiarity.of(clouds),
         ).save(job.out)

@@ -56,16 +56,10 @@ def explain(job: Job) -> None:
             elif not samples.left_out(control, registrations, settings, encoder.backbone):
                 changed = samples.variant(control, registrations, *job.axes, settings, icp)
                 embeddings[control] = read_embedding(path, changed, logits=True)
+        embed = embedding_by(load_model(job.encoder, encoder, axes=job.axes), job.seed, encoder)
+        own = all_hard.pop(job.source, None)
         experiment = ControlRun(
-            *job.axes,
-            settings,
-            encoder.backbone,
-            uncertainty,
-            rivals,
-            embedding_by(load_model(job.encoder, encoder, axes=job.axes), job.seed, encoder),
-            embeddings,
-            all_hard.pop(job.source, None),
-            list(all_hard.values()),
+            *job.axes, settings, encoder.backbone, uncertainty, rivals, embed, embeddings, own, [*all_hard.values()]
         )
         asked = {name: Registrations.load(path, (name, job.seed)) for name, path in others.items()}
         write_csv(job.predictions, experiment.run(registrations, asked))

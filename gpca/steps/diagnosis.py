@@ -245,12 +245,9 @@ class World:
                 scores_S_C[rows], abstained_S[rows] = answer.scores_N_C, answer.abstained_N
             all_scores.append(scores_S_C)
             all_abstained.append(abstained_S)
-        return Attribution.of_scores(
-            LABELS,
-            np.mean(all_scores, axis=0),
-            icp_calls=self._calls(entry.sees),
-            abstained_N=np.all(all_abstained, axis=0),
-        )
+        scores_S_C, abstained_S = np.mean(all_scores, axis=0), np.all(all_abstained, axis=0)
+        calls = self._calls(entry.sees)
+        return Attribution.of_scores(LABELS, scores_S_C, icp_calls=calls, abstained_N=abstained_S)
 
 
 def frames_to_explain(job: Job, causes: Causes, enacted: Path | None, learned: dict[str, list[Path]]) -> World:

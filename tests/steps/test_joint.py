@@ -50,7 +50,7 @@ def folder(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         folder = tmp_path_factory.mktemp("joint")
         patch.chdir(folder)
-        patch.setattr("gpca.steps.joint_readings.gpc_settings", hardly_trained)
+        patch.setattr("gpca.steps.joint_readings.scheduled", hardly_trained)
         for source in ("shapes", "ycb"):
             write_objects(list(surfaces("coffee_cup"))[:2], source, folder / f"{source}.npz", 1024)
             for severities in ("protocol", "weaker"):
@@ -73,11 +73,11 @@ def folder(tmp_path_factory):
         yield folder
 
 
-def hardly_trained(settings, schedule):
+def hardly_trained(section, schedule):
     """The classifier of a row of Table IV after two iterations."""
     from gpca.classifier.settings import GPCSettings
 
-    return GPCSettings(**settings.gpc, kernel=schedule[0], learning_rate=schedule[1], iterations=2)
+    return GPCSettings(**section, kernel=schedule[0], learning_rate=schedule[1], iterations=2)
 
 
 def test_the_reading_gives_every_number_of_its_source_a_value(folder, monkeypatch):
