@@ -143,7 +143,8 @@ def test_a_pair_without_meaning_has_a_status_of_its_own(folder, capsys, form):
         assert all(line["diagnosis"]["state"] != "unknown" for line in rest)
         assert "warning: no source point ended near the target, so the scores are meaningless" in err
     else:
-        assert "state     unknown\naction    check what was given (the initial pose and the unit)" in out
+        assert "state     unknown\naction    check what was given\nreason    the numbers mean nothing until " in out
+        assert "checked: the initial pose and the unit\n" in out
 
 
 def test_several_sources_are_a_line_each(folder, capsys):
