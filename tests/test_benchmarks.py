@@ -9,8 +9,8 @@ import pytest
 
 from benchmarks import floor, pipeline
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.uncertainty.designs import DESIGNS
 from gpca.uncertainty.outcomes import Outcomes
+from gpca.uncertainty.settings import CONDITIONS
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -128,7 +128,7 @@ def run_with_uncertainty(tmp_path, registrations):
     clean_S = np.where(np.arange(len(test)) % 2, 1e-6, 1e-10)
     causal = np.column_stack([np.full(len(test), 1e-6), clean_S, np.where(true_S_3[:, 0], 1e-6, 1e-4)])
     assert [variances.shape[1] for variances in (additive, causal)] == [
-        len(DESIGNS[design].conditions) for design in floor.DESIGNS_READ
+        len(CONDITIONS[design]) for design in floor.DESIGNS_READ
     ]
     for seed in (0, 1):
         (path := tmp_path / "registrations" / "tiny" / f"seed{seed}.npz").parent.mkdir(parents=True, exist_ok=True)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from gpca.io.arrays import save_arrays
-from gpca.uncertainty.designs import DESIGNS
+from gpca.uncertainty.settings import CONDITIONS
 
-K = len(DESIGNS["removal"].conditions)
+K = len(CONDITIONS["removal"])
 
 
 @pytest.fixture(scope="package")
