@@ -78,10 +78,19 @@ class ScannedScene:
     def pair(self, known: Known) -> ScanPair:
         """Return a pair with its clouds."""
         source, target = self.scans[known.source], self.scans[known.target]
-        overlap = float("nan") if known.overlap is None else known.overlap
         return ScanPair(
-            *(source.points_N_3, target.points_N_3, self._relative(known), overlap, self.name, self.kind, self.size_m),
-            *(known.source, known.target, source.viewpoint_3, target.viewpoint_3, self.family),
+            source_N_3=source.points_N_3,
+            target_M_3=target.points_N_3,
+            T_target_source=self._relative(known),
+            overlap=float("nan") if known.overlap is None else known.overlap,
+            scene=self.name,
+            kind=self.kind,
+            size_m=self.size_m,
+            source_name=known.source,
+            target_name=known.target,
+            source_viewpoint_3=source.viewpoint_3,
+            target_viewpoint_3=target.viewpoint_3,
+            family=self.family,
         )
 
     def _relative(self, pair: Known) -> np.ndarray:
@@ -152,17 +161,23 @@ class ScanPairs(Container):
     def __getitem__(self, k: int) -> ScanPair:
         """Return pair number k; its points are float64."""
         source, target = int(self.source_scan[k]), int(self.target[k])
-        viewpoint, known = self.viewpoint.astype(np.float64), self.viewpoint_known
-        kind: Kind = "object" if self.kind[k] == "object" else "room"
         return ScanPair(
-            self.part("points", source).astype(np.float64),
-            self.part("points", target).astype(np.float64),
-            self.T_target_source[k],
-            *(float(self.overlap[k]), str(self.scene[k]), kind, float(self.size_m[k])),
-            *(str(self.scan[source]), str(self.scan[target])),
-            *(viewpoint[source] if known[source] else None, viewpoint[target] if known[target] else None),
+            source_N_3=self.part("points", source).astype(np.float64),
+            target_M_3=self.part("points", target).astype(np.float64),
+            T_target_source=self.T_target_source[k],
+            overlap=float(self.overlap[k]),
+            scene=str(self.scene[k]),
+            kind="object" if self.kind[k] == "object" else "room",
+            size_m=float(self.size_m[k]),
+            source_name=str(self.scan[source]),
+            target_name=str(self.scan[target]),
+            source_viewpoint_3=self._viewpoint(source),
+            target_viewpoint_3=self._viewpoint(target),
             family=str(self.cluster[k]),
         )
+
+    def _viewpoint(self, scan: int) -> np.ndarray | None:
+        return self.viewpoint[scan].astype(np.float64) if self.viewpoint_known[scan] else None
 
     @classmethod
     def of(cls, pairs: Iterable[ScanPair]) -> ScanPairs:

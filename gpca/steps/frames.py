@@ -83,8 +83,8 @@ def instances(job: Job) -> None:
     declared = {**job.settings, "surface_points": job.surface_points}
     with record_provenance([job.instances, job.objects], inputs, declared):
         frames = {name: each.frames() for name, each in datasets.items()}
-        own = {name: dataset.read_models(datasets[name], shown) for name, shown in frames.items()}
-        models = dataset.with_shared_models(own)
+        read_models = {name: dataset.read_models(datasets[name], shown) for name, shown in frames.items()}
+        models = dataset.with_shared_models(read_models)
         objects = sample_objects(dataset.distinct_surfaces(models), job.source, job.surface_points)
         read = {name: (each, frames[name], models[name]) for name, each in datasets.items()}
         instances = read_instances(read, objects, initial_pose)
@@ -95,9 +95,9 @@ def instances(job: Job) -> None:
 
 def frame_registrations(job: Job) -> None:
     """Perturb and align instances -> ``registrations/{source}/seed{seed}.npz``, and their pose errors."""
-    of_registrations = dict(job.settings)
-    own = {name: of_registrations.pop(name) for name in ("test_share", "occluders") if name in of_registrations}
-    settings = FrameSettings(**own, registration=read_settings(RegistrationSettings, of_registrations))
+    registration = dict(job.settings)
+    frame_settings = {name: registration.pop(name) for name in ("test_share", "occluders") if name in registration}
+    settings = FrameSettings(**frame_settings, registration=read_settings(RegistrationSettings, registration))
     inputs, name = [job.instances, job.objects], job.get("name", job.source)
     with record_provenance([job.registrations, job.poses, job.timings], inputs, job.settings, seed=job.seed):
         made = make_frame_registrations(*_instances(job, name), job.source, job.seed, settings)

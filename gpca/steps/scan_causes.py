@@ -33,23 +33,23 @@ GlobalMethod = Callable[[ScanPair], np.ndarray | None]  # returns T_target_sourc
 
 def measure(job: Job) -> None:
     """Draw pairs and starts, measure what made the registrations fail, describe and re-enact them."""
-    own = read_settings(ScanSamples, job.section("samples"))
+    settings = read_settings(ScanSamples, job.section("samples"))
     outputs = [job.scan_causes, job.samples, job.descriptors, job.reenactments]
     with record_provenance(outputs, job.get("data", []), job.settings, seed=job.seed):
         axes, section = job.axes, job.section("scans")
-        chosen = drawn_pairs(job, section | {"pairs": own.pairs})
-        kept = np.sort(generator(*axes, "scan causes", "pairs").permutation(len(chosen))[: own.most_pairs])
+        chosen = drawn_pairs(job, section | {"pairs": settings.pairs})
+        kept = np.sort(generator(*axes, "scan causes", "pairs").permutation(len(chosen))[: settings.most_pairs])
         pairs = ScanPairs.of([chosen[k] for k in kept])
         # Counterfactuals are registered as those of objects, but the source onto the target.
-        icp = {name: getattr(own.icp, name) for name in ("correspondence_distance", "max_iterations")}
+        icp = {name: getattr(settings.icp, name) for name in ("correspondence_distance", "max_iterations")}
         truth = CauseSettings.from_dict(job.section("causes") | {"moved": OBSERVED}, icp)
         trials = read_settings(TrialSettings, fields_of(section, TrialSettings))
         methods = {}
-        if own.global_start:
+        if settings.global_start:
             methods[trials.global_start] = global_method(trials, job.section("methods"), *axes)
-        starts = starts_of(pairs, *axes, own, trials.ladder, methods)
+        starts = starts_of(pairs, *axes, settings, trials.ladder, methods)
         success = read_settings(ScanSuccess, section.get("success") or {})
-        causes, samples = measure_scans(pairs, starts, *axes, truth, success, own.points)
+        causes, samples = measure_scans(pairs, starts, *axes, truth, success, settings.points)
         causes.save(job.scan_causes)
         samples["stands_for"] = samples["pair"].map({pair.name: pair.stands_for for pair in chosen})
         write_csv(job.samples, samples)
@@ -90,13 +90,13 @@ def starts_of(
         drawn = [rungs[row] for row in order[: settings.ladder_starts]]
         poses = {rung.name: disturbed(pair, rung, source, seed) for rung in drawn}
         results = {name: register(pair) for name, register in methods.items()}
-        known = {name: pose for name, pose in results.items() if pose is not None}
-        found = tuple(known.values())
-        starts += [ScanStart(k, LADDER, name, pose, found=found) for name, pose in poses.items()]
-        starts += [ScanStart(k, GLOBAL, name, pose, found=found) for name, pose in known.items()]
+        converged = {name: pose for name, pose in results.items() if pose is not None}
+        global_poses = tuple(converged.values())
+        starts += [ScanStart(k, LADDER, name, pose, found=global_poses) for name, pose in poses.items()]
+        starts += [ScanStart(k, GLOBAL, name, pose, found=global_poses) for name, pose in converged.items()]
         if settings.times and drawn:
             times = settings.times[k % len(settings.times)]
-            starts.append(ScanStart(k, LADDER, drawn[0].name, poses[drawn[0].name], times, found))
+            starts.append(ScanStart(k, LADDER, drawn[0].name, poses[drawn[0].name], times, global_poses))
     return starts
 
 
@@ -108,16 +108,17 @@ def diagnose(job: Job) -> None:
     training = learned_files(job)
     inputs = [path for files in (*scans, *training.values()) for path in files]
     with record_provenance([job.predictions], inputs, job.settings, seed=job.seed):
-        own, parts = [], []
+        measured, parts = [], []
         for path, described, enacted in zip(*scans, strict=True):
             causes = Causes.load(path)
-            own.append(causes.registrations)
+            measured.append(causes.registrations)
             registrations = with_what_it_reads(labeled(causes), DESCRIBED, described)
             parts.append(with_what_it_reads(registrations, REENACTED, enacted))
         whole = Registrations.joined(parts)
-        sample_S, concept_S = (np.concatenate([getattr(each, name) for each in own]) for name in ("sample", "concept"))
+        sample_S = np.concatenate([registrations.sample for registrations in measured])
+        concept_S = np.concatenate([registrations.concept for registrations in measured])
         shown = replace(whole, sample=sample_S, concept=concept_S)
-        data_set_S = np.repeat([path.parent.name for path in job.scan_causes], [len(each) for each in own])
+        data_set_S = np.repeat([path.parent.name for path in job.scan_causes], [*map(len, measured)])
         labels_alone = replace(whole, attached={"causes": whole.attached["causes"]})
         fold_S = folds_of(whole.cluster, read_settings(ScanSamples, job.section("samples")).folds)
         world = World(job, training, labels_alone, job.section("causes")["starts"], lambda _: whole, fold_S)
