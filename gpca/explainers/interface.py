@@ -95,6 +95,7 @@ class ScoringExplainer:
         """Learn nothing; explainers that learn override this."""
 
     def explain(self, registrations: Registrations) -> Attribution:
+        """Score every registration."""
         started = perf_counter()
         scores_N_C, variances_N_C, bald_N = self.summary(registrations)
         seconds = (perf_counter() - started) / len(registrations)
@@ -107,6 +108,7 @@ class ScoringExplainer:
         return self.scores(registrations), None, None
 
     def scores(self, registrations: Registrations) -> np.ndarray:
+        """Return the scores (N, C)."""
         raise NotImplementedError
 
 
@@ -130,6 +132,7 @@ class ClassifierExplainer(ScoringExplainer):
         return scores_of(self._classifier, self.features(registrations), self.labels)
 
     def features(self, registrations: Registrations) -> np.ndarray:
+        """Return the classifier's features (N, F)."""
         raise NotImplementedError
 
 

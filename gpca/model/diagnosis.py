@@ -116,7 +116,7 @@ class Guaranteed:
         return [
             f"{name:10}{states} ({self.level:.0%} of such sets contain the true state)",
             f"alarm     {answer} ({risk})",
-            f"guarantee of both: calibrated {self.basis}",
+            f"guarantee both are calibrated {self.basis}",
         ]
 
     @property
