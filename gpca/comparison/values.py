@@ -7,7 +7,6 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,10 +25,8 @@ from gpca.evaluation.intervals import (
 )
 from gpca.evaluation.measures import ALL, read_metrics, source_method_seed
 from gpca.evaluation.runtime_file import read_runtime
+from gpca.io.frame import Frame, Series
 from gpca.jobs.provenance import read_record
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 RUNTIME = "runtime.csv"
 FOLDERS = {"metrics.csv": "predictions", "real_world.csv": "predictions", "diagnostics.csv": "learners"}
@@ -78,7 +75,7 @@ def mean_bounds(mean: float, deviation: float, n: int, unit: Unit, samples: int 
     return min(max(low, unit.least), unit.most), min(max(high, unit.least), unit.most)
 
 
-def read_results(paths: Iterable[str | Path]) -> dict[str, pd.DataFrame]:
+def read_results(paths: Iterable[str | Path]) -> dict[str, Frame]:
     return {Path(path).name: (read_runtime if Path(path).name == RUNTIME else read_metrics)(path) for path in paths}
 
 
@@ -89,7 +86,7 @@ def measured_on(paths: Iterable[str | Path]) -> str:
 
 
 def value_of_run(
-    number: Number, results: Mapping[str, pd.DataFrame], clusters: Mapping[Counterpart, ShareDraws] | None = None
+    number: Number, results: Mapping[str, Frame], clusters: Mapping[Counterpart, ShareDraws] | None = None
 ) -> Reproduced | None:
     """Return the run's value for a printed number, in its unit; None where the run has none."""
     counterpart, unit, at_least = number.counterpart, UNITS[number.unit], False
@@ -117,11 +114,11 @@ def value_of_run(
     return Reproduced(mean, low, high, n, at_least, *around, deviation, samples / n)
 
 
-def values_by_seed(rows: pd.DataFrame, counterpart: Counterpart) -> tuple[pd.Series, bool]:
+def values_by_seed(rows: Frame, counterpart: Counterpart) -> tuple[Series, bool]:
     """Return the counterpart's values in a tidy file, by seed, and whether some of them are lower bounds."""
     rows = rows[(rows["table"] == counterpart.table) & (rows["concept"] == counterpart.concept)]
 
-    def by_seed(source: str, method: str, metric: str) -> pd.Series:
+    def by_seed(source: str, method: str, metric: str) -> Series:
         chosen = (rows["source"] == source) & (rows["method"] == method) & (rows["metric"] == metric)
         return rows[chosen].set_index("seed")["value"]
 
@@ -137,7 +134,7 @@ def values_by_seed(rows: pd.DataFrame, counterpart: Counterpart) -> tuple[pd.Ser
     return sum(sources[1:], sources[0]) / len(sources), at_least
 
 
-def runtime_mean(rows: pd.DataFrame, counterpart: Counterpart) -> tuple[float, float, int] | None:
+def runtime_mean(rows: Frame, counterpart: Counterpart) -> tuple[float, float, int] | None:
     """Return the sum of the components' mean seconds on one device, its standard error, and the repeats."""
     rows = rows[rows["device"] == counterpart.concept].set_index("component")
     if not set(counterpart.methods) <= set(rows.index):
@@ -188,7 +185,7 @@ def cluster_draws(
     """Return the shares by the pigeonhole bootstrap over clusters and seeds."""
     import pandas as pd
 
-    parts: dict[Folder, list[pd.DataFrame]] = defaultdict(list)
+    parts: dict[Folder, list[Frame]] = defaultdict(list)
     asked = {each: folder for each in counterparts if each and (folder := folder_behind(each))}
     for path in prediction_files:
         source, method, seed = source_method_seed(path)

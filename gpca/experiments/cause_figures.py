@@ -16,6 +16,7 @@ from gpca.errors import InputError
 from gpca.evaluation.measures import source_method_seed
 from gpca.experiments.cause_tables import COMPARED, SECTION
 from gpca.experiments.diagnosis import cause_titles
+from gpca.experiments.registration_stages import title_of_sample
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.perturbation import CONCEPTS, NOISE, OVERLAP
 from gpca.reenactment.settings import ReenactmentSettings
@@ -24,7 +25,6 @@ from gpca.reporting.figures.cloud_views import widest_views
 from gpca.reporting.figures.panels import color_on_blue, write_below
 from gpca.reporting.figures.solid import NEUTRAL, Solid
 from gpca.reporting.figures.style import CONCEPT_COLORS, SMALL_PT, TEXT_WIDTH_IN, blues, use_style, write_title
-from gpca.reporting.words import object_in_words
 from gpca.rigid import transform
 from gpca.seeds import seed_of_file
 from gpca.settings import read_settings
@@ -71,17 +71,13 @@ def causes_example(run: Run, objects_npz: Path, causes_npz: Path, predictions_cs
     _draw_waterfall(left.subplots(), error_8[NONE], phi_3)
     _draw_scores(right.subplots(), answers)
     error = f"{100 * causes.error_shown[row]:.1f} %"
-    write_title(drawing, f"{_shown(run, causes, row)}. The registration shown to the explainers is off by {error}")
+    sample = title_of_sample(run, causes.registrations.object_name[row])
+    write_title(drawing, f"{sample}. The registration shown to the explainers is off by {error}")
     return drawing
 
 
 def _truth_of(run: Run) -> CauseSettings:
     return CauseSettings.from_dict(dict(run.config["causes"]), dict(run.config["registrations"]["icp"]))
-
-
-def _shown(run: Run, causes: Causes, row: int) -> str:
-    source, name = run.config["figures"]["source"], causes.registrations.object_name[row]
-    return f"{run.source_titles[source]}: {object_in_words(name, run.datasets[source])}"
 
 
 GALLERY_IN, LETTERS = 1.8, 44  # height of a row of failures with what explainers say, and letters of a line there
@@ -273,7 +269,7 @@ def reenactment(run: Run, objects_npz: Path, causes_npz: Path, reenactments_npz:
     phi_3 = shapley_values((weight_K @ errors_K_8)[None])[0]
     named, true = CONCEPTS[int(np.argmax(phi_3))], causes.truth.dominant[row]
     verdict = f"It names {named}" + (", as measured" if named == true else f"; measured is {true}")
-    write_title(drawing, f"{_shown(run, causes, row)}. {verdict}")
+    write_title(drawing, f"{title_of_sample(run, causes.registrations.object_name[row])}. {verdict}")
     return drawing
 
 

@@ -7,11 +7,10 @@ from typing import Any
 
 from gpca.causes.judged import CEILING
 from gpca.declarations import Frame, Run, figure, table
-from gpca.evaluation.intervals import REPEATS
+from gpca.evaluation.intervals import FEWEST_CLUSTERS, FEWEST_FAILURES, REPEATS
 from gpca.evaluation.measures import POOLED
 from gpca.experiments.confusions import draw_confusions
-from gpca.experiments.diagnosis import cause_costs, cause_titles
-from gpca.experiments.leads import lead
+from gpca.experiments.diagnosis import JUDGED, TRAINED, cause_costs, cause_titles
 from gpca.explainers.interface import WORDS
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.sheet import Cell, Column, Row, Sheet, crossed, show, where, with_label
@@ -104,6 +103,31 @@ def table9_causes(run: Run, intervals):
     caption += run.stand_ins()
     bold = sorted((key for key in SHOWN if key not in NOT_COMPARED), key=lambda key: key != "balanced_accuracy")
     return sheet.table(caption, "metric", notes, bold=bold, same=1)
+
+
+def lead(intervals: Frame, titles: Mapping[str, str]) -> str:
+    """Sentence on the lead over all sources together, with titles of explainers; empty where no rows have it.
+
+    Each dominant cause has a third of the failures.
+    """
+    rows = rows_where(intervals, method=JUDGED, source=POOLED).set_index(["against", "metric"], drop=False)
+    if (TRAINED, "balanced_accuracy") not in rows.index:
+        return ""
+    nominal, failed = rows.loc[""].loc[["false_alarm_rate", "dominant_accuracy"], "samples"]
+    row, fewest = rows.loc[(TRAINED, "balanced_accuracy")], int(min(nominal, failed // len(CONCEPTS)))
+    if fewest < FEWEST_FAILURES or row["clusters"] < FEWEST_CLUSTERS:
+        counted = f"{fewest} samples of a kind and {row['clusters']:.0f} families"
+        return f"Too little to conclude who leads: {counted} (it takes {FEWEST_FAILURES} and {FEWEST_CLUSTERS})."
+    title, other = (titles[row[name]] for name in ("method", "other"))
+    best = f"{other}, the best explainer that is trained and reads no re-enactment"
+    value, low, high = 100 * row[["value", "low", "high"]].astype(float)
+    least, most = sorted((abs(low), abs(high)))
+    points = f"{abs(value):.1f} points of balanced accuracy ({least:.1f} to {most:.1f})"
+    if high < 0:
+        return f"{best}, leads {title} by {points}."
+    if low > 0:
+        return f"{title} leads {best}, by {points}."
+    return f"{title} is not shown to lead {best}: {value:+.1f} points of balanced accuracy ({low:.1f} to {high:.1f})."
 
 
 def rule_near_chance(intervals: Frame, sources: Iterable[str], **wanted: object) -> str:

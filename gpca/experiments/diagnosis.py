@@ -1,7 +1,7 @@
 """Causes of failed registrations: explainers against the measured shares of each cause in the error (Table IX)."""
 
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -12,12 +12,11 @@ from gpca.causes.dataset import LABELS
 from gpca.causes.judged import CEILING, MEASURES, Judged, counted, joined, measure, read_judged
 from gpca.causes.settings import DescriptorSettings
 from gpca.causes.truth import BORDERLINE
-from gpca.declarations import ByName, Experiment, Frame, LeftOut, Names, Paths, Run, Step, Wildcards, numbers
-from gpca.encoders.registry import NamedEncoder, require_backbone, require_draws
+from gpca.declarations import ByName, Experiment, Frame, LeftOut, Names, Paths, Plan, Run, Step, Wildcards, numbers
+from gpca.encoders.registry import NamedEncoder, encoder_module, require_backbone, require_draws
 from gpca.errors import InputError, with_key
-from gpca.evaluation.intervals import ANYTHING, TRIVIAL, Clustered
+from gpca.evaluation.intervals import ANYTHING, TRIVIAL, WITHOUT_TRAINING, Clustered
 from gpca.evaluation.measures import ALL, POOLED, Measure, Rivals, compared, intervals, tidy
-from gpca.experiments.leads import TRAINED, trained_rivals
 from gpca.explainers.interface import BARE, EMBEDDINGS, REENACTED, icp_calls
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module, explainers, require_settings
 from gpca.reenactment.settings import ReenactmentSettings
@@ -25,6 +24,8 @@ from gpca.settings import part_of
 
 NAME = "diagnosis"
 TABLE = "causes"
+TRAINED = "trained"  # kind of differences: from the best explainer that is trained and reads no re-enactment
+JUDGED = "reenact"  # explainer whose lead over that is reported
 
 
 @dataclass(frozen=True)
@@ -56,12 +57,14 @@ def cause_titles(config: Mapping[str, Any], key: str = "explainers") -> dict[str
     return {name: explainer_entry(name, CAUSES).title for name in config[NAME][key]}
 
 
-def cause_costs(config: Mapping[str, Any], names: Iterable[str]) -> dict[str, dict[str, Any]]:
+def cause_costs(
+    config: Mapping[str, Any], names: Iterable[str], reenactment: Mapping[str, Any] | None = None
+) -> dict[str, dict[str, Any]]:
     """What each explainer ``sees``, in words, and its number of ``icp_calls`` beyond the one that it explains."""
     starts, descriptors = config["causes"]["starts"], DescriptorSettings(**config[NAME]["descriptors"])
-    reenactment = ReenactmentSettings(**config[NAME]["reenactment"]).calls(starts)
+    reenacted = ReenactmentSettings(**(reenactment or config[NAME]["reenactment"])).calls(starts)
     entries = {name: explainer_entry(name, CAUSES) for name in names}
-    calls = {name: icp_calls(entry.sees, starts, descriptors, reenactment) for name, entry in entries.items()}
+    calls = {name: icp_calls(entry.sees, starts, descriptors, reenacted) for name, entry in entries.items()}
     return {name: {"sees": entry.sight, "icp_calls": calls[name]} for name, entry in entries.items()}
 
 
@@ -91,6 +94,12 @@ def _of_all(wildcards: Wildcards, folder: str) -> str | list[str]:
     """Files of all sources; none for an explainer of one source, or of embeddings by an encoder of one source."""
     entry = explainer_entry(wildcards.cause_explainer, CAUSES)
     return [] if entry.reads == EMBEDDINGS else f"{folder}/{{*source}}/seed{{*seed}}.npz"
+
+
+def explaining_modules(plan: Plan, names: Iterable[str]) -> list[str]:
+    """Modules of explainers of causes, and that of the encoder whose embeddings some of them read."""
+    encoder = encoder_module(plan.config[NAME]["encoder"])
+    return [encoder, *(explainer_module(name, CAUSES) for name in names)]
 
 
 FURTHER = "learning_samples/{*source}/chunk{*chunk}.npz"
@@ -194,6 +203,13 @@ AGAINST: dict[str, Rivals] = {
     "rival": lambda name, names: () if name == CEILING else [other for other in names if other != CEILING],
     "trivial": lambda name, names: () if name == CEILING else TRIVIAL,
 }
+
+
+def trained_rivals(name: str, names: Collection[str]) -> list[str]:
+    """Rivals of what needs no training, and of all but the ceiling: who learns and reads no re-enactment."""
+    entries = explainers(CAUSES)
+    learned = [other for other in names if other in entries and other not in WITHOUT_TRAINING]
+    return [other for other in learned if name != CEILING and "reenactment" not in entries[other].sees]
 
 
 def compared_by_source(

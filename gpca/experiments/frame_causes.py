@@ -12,14 +12,13 @@ from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.causes.judged import CEILING, MEASURES, Judged, ceiling_of, joined, judged_by, measure
 from gpca.causes.truth import BORDERLINE, FAILED, GEOMETRY, NOMINAL, Truth
 from gpca.declarations import Experiment, Frame, Paths, Plan, Run, Step, numbers, table
-from gpca.encoders.registry import encoder_module
 from gpca.evaluation.intervals import FEWEST_FAILURES, REPEATS, Clustered, pigeonhole_weights
 from gpca.evaluation.measures import ALL, intervals
 from gpca.experiments import cause_tables as tables
-from gpca.experiments.diagnosis import FURTHER, TABLE, cause_costs, cause_titles, compared_samples
+from gpca.experiments.diagnosis import FURTHER, TABLE, cause_costs, cause_titles, compared_samples, explaining_modules
 from gpca.experiments.frames import title_of_frames
 from gpca.explainers.interface import REENACTED
-from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module
+from gpca.explainers.registry import CAUSES, explainer_entry
 from gpca.frames.source import REAL_WORLD
 from gpca.frames.starts import CARRIED, KINDS, LADDER, NATIVE, TRANSPLANTED
 from gpca.io.container import require_same_samples
@@ -69,10 +68,7 @@ DIAGNOSE_FRAMES = Step(
     outputs={"predictions": "frame_diagnoses/seed{seed}.csv"},
     settings=lambda plan, wildcards: plan.config["diagnosis"] | {"icp": plan.config["registrations"]["icp"]},
     params={"source": REAL_WORLD},
-    modules=lambda plan: [
-        encoder_module(plan.config["diagnosis"]["encoder"]),
-        *(explainer_module(name, CAUSES) for name in plan.config["diagnosis"]["explainers"]),
-    ],
+    modules=lambda plan: explaining_modules(plan, plan.config["diagnosis"]["explainers"]),
 )
 
 

@@ -181,7 +181,7 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 EXPERIMENT = Experiment(
     name="real_world",
     sections={"real_world": RealWorldSettings},
-    beside=("frame_accuracies", "frame_tables", "frame_pictures"),
+    beside=("frame_tables", "frame_pictures"),
     names=names,
     check=check,
     optional_entries={"real_world.datasets": Names("dataset"), "real_world.explainers": EXPLAINERS},

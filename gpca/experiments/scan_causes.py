@@ -20,14 +20,14 @@ from gpca.causes.scans import GLOBAL, KINDS
 from gpca.causes.settings import SCANS, ScanSamples
 from gpca.causes.truth import BORDERLINE, GEOMETRY
 from gpca.declarations import Experiment, Frame, LeftOut, Names, Paths, Run, Step, numbers
-from gpca.encoders.registry import encoder_module
 from gpca.errors import InputError, with_key
 from gpca.evaluation.intervals import TRIVIAL, Clustered, best_of, corrected, interval, weighted_mean
 from gpca.evaluation.measures import ALL, POOLED
+from gpca.experiments.diagnosis import explaining_modules
 from gpca.experiments.frame_causes import count_ends, ends_of
 from gpca.experiments.scans import EACH_SET, ChoiceSettings, files_of_set, place_of_set
 from gpca.explainers.registry import CAUSES as CAUSE_EXPLAINERS
-from gpca.explainers.registry import explainer_module, explainers, require_settings
+from gpca.explainers.registry import explainers, require_settings
 from gpca.io.container import require_same_samples
 from gpca.io.csv_file import ANY, read_csv, read_numbers
 from gpca.io.csv_file import numbers as number_column
@@ -145,10 +145,7 @@ DIAGNOSE = Step(
         plan.config, plan.config["scan_causes"]["explainers"], settings_of_explainers(plan.config)
     ),
     params={"source": "scans"},
-    modules=lambda plan: [
-        encoder_module(plan.config["diagnosis"]["encoder"]),
-        *(explainer_module(name, CAUSE_EXPLAINERS) for name in plan.config["scan_causes"]["explainers"]),
-    ],
+    modules=lambda plan: explaining_modules(plan, plan.config["scan_causes"]["explainers"]),
     where={"seed": "scan_seed"},
 )
 

@@ -8,22 +8,21 @@ import numpy as np
 
 from gpca.causes.judged import CEILING
 from gpca.causes.scans import GLOBAL, LADDER
-from gpca.causes.settings import OBJECTS, SCANS, DescriptorSettings
+from gpca.causes.settings import OBJECTS, SCANS
 from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
-from gpca.declarations import Run, figure, plain, table
+from gpca.declarations import Run, figure, table
 from gpca.errors import InputError
 from gpca.evaluation.intervals import FEWEST_CLUSTERS, FEWEST_FAILURES, REPEATS
 from gpca.evaluation.measures import POOLED
 from gpca.experiments import cause_tables as tables
 from gpca.experiments import scan_causes as scans
+from gpca.experiments.diagnosis import cause_costs
 from gpca.experiments.frame_causes import ENDS, MISSED_NOTE, counts_in, sheet_of_counts
 from gpca.experiments.scan_causes import ADDED, CAUSES, EVERY, NATURAL, TRUTH
 from gpca.experiments.scans import titles_of_scans
-from gpca.explainers.interface import WORDS, icp_calls
 from gpca.explainers.registry import CAUSES as CAUSE_EXPLAINERS
 from gpca.explainers.registry import explainer_entry
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reporting.figures.panels import in_lines, legend_below, panels
 from gpca.reporting.figures.style import CONCEPT_COLORS, GRAY, LIGHT_GRAY, SKY_BLUE, SMALL_PT, TEXT_WIDTH_IN
 from gpca.reporting.sheet import Column, Row, Sheet, crossed, interval_cell, plain_cell, plural, show, where
@@ -61,13 +60,9 @@ ROW_IN = 0.30
     **MEASURED,
 )
 def table18_scan_causes(run: Run, measured):
-    starts = run.config["causes"]["starts"]
-    descriptors = DescriptorSettings(**plain(run.config["diagnosis"]["descriptors"]))
-    reenactment = ReenactmentSettings(**plain(scans.reenactment_settings(run.config))).calls(starts)
-    entries = {name: explainer_entry(name, CAUSE_EXPLAINERS) for name in run.config["scan_causes"]["explainers"]}
-    calls = {name: icp_calls(entry.sees, starts, descriptors, reenactment) for name, entry in entries.items()}
-    sights = {name: entry.sight for name, entry in entries.items()} | {CEILING: WORDS["truth"]}
-    explainers = {name: entry.title for name, entry in entries.items()} | tables.AGAIN
+    names = run.config["scan_causes"]["explainers"]
+    costs = cause_costs(run.config, names, scans.reenactment_settings(run.config)) | tables.COSTS
+    explainers = {name: explainer_entry(name, CAUSE_EXPLAINERS).title for name in names} | tables.AGAIN
     rows, counted = [], []
     for name, title in (TOGETHER | titles_of_scans(run.config)).items():
         if not (of := counts_of(measured, name, NATURAL, EVERY)):
@@ -77,7 +72,7 @@ def table18_scan_causes(run: Run, measured):
         data = (name, f"{title} ({of['failed']} failed, {of[NOMINAL]} nominal{few})")
         natural = {"source": name, "condition": NATURAL, "stratum": EVERY}
         for explainer, learned in product(explainers.items(), LEARNED.items()):
-            labels = [data, explainer, learned, (sights[explainer[0]],) * 2]
+            labels = [data, explainer, learned, (costs[explainer[0]]["sees"],) * 2]
             place = natural | {"method": explainer[0], "learned": learned[0]}
             rows.append(Row(labels, place, rival=enough and explainer[0] != CEILING))
         by_cause = ", ".join(f"{of[concept]} by {concept}" for concept in CONCEPTS if of[concept])
@@ -96,8 +91,8 @@ def table18_scan_causes(run: Run, measured):
         if scans.SAMPLES in rows.index:
             judged, seeds = (int(rows.loc[scans.SAMPLES, name]) for name in ("value", "seeds"))
             cells["samples"] = plain_cell(judged, seeds, judged)
-            if calls.get(method) is not None:
-                cells["icp_calls"] = plain_cell(calls[method], seeds, judged)
+            if (calls := costs.get(method, {}).get("icp_calls")) is not None:
+                cells["icp_calls"] = plain_cell(calls, seeds, judged)
         return cells
 
     heads = {"scans": "Scans", "explainer": "Explainer", "learned": "Learned from", "reads": "Reads"}

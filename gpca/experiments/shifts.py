@@ -14,14 +14,21 @@ from gpca.causes.dataset import Causes
 from gpca.causes.judged import CEILING, MEASURES, Judged, ceiling_of, counted, joined, judged_by, measure
 from gpca.causes.settings import Calls
 from gpca.declarations import Experiment, Frame, LeftOut, Names, Paths, Plan, Run, Step, Wildcards, numbers, table
-from gpca.encoders.registry import encoder_module
 from gpca.errors import InputError, with_key
 from gpca.evaluation.intervals import ANYTHING, GUESSES, REPEATS, Clustered
 from gpca.evaluation.measures import POOLED, compared, intervals
 from gpca.experiments.cause_tables import AGAIN, POINTS, SECTION, SHOWN
-from gpca.experiments.diagnosis import CAUSES_FILES, FURTHER, TABLE, cause_titles
-from gpca.experiments.leads import JUDGED, TRAINED, trained_rivals
-from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module
+from gpca.experiments.diagnosis import (
+    CAUSES_FILES,
+    FURTHER,
+    JUDGED,
+    TABLE,
+    TRAINED,
+    cause_titles,
+    explaining_modules,
+    trained_rivals,
+)
+from gpca.explainers.registry import CAUSES, explainer_entry
 from gpca.io.container import require_same_samples
 from gpca.reporting.sheet import Cell, Row, Sheet, Show, plain_cell, plural, rows_where, show
 from gpca.seeds import seed_of_file
@@ -120,10 +127,7 @@ DIAGNOSE = Step(
         "explainers": {name: plan.config["diagnosis"]["explainers"][name] for name in plan.config[NAME]["explainers"]},
     },
     params={"source": NAME, "sources_asked": lambda plan, wildcards: list(plan.config[NAME]["sources"])},
-    modules=lambda plan: [
-        encoder_module(plan.config["diagnosis"]["encoder"]),
-        *(explainer_module(name, CAUSES) for name in plan.config[NAME]["explainers"]),
-    ],
+    modules=lambda plan: explaining_modules(plan, plan.config[NAME]["explainers"]),
 )
 
 

@@ -9,7 +9,8 @@ from gpca.active_learning.settings import JUDGED_SHARE, rare_setting
 from gpca.causes.judged import CEILING
 from gpca.evaluation.intervals import TRIVIAL
 from gpca.evaluation.measures import ALL, POOLED, read_rows
-from gpca.experiments.leads import JUDGED, TRAINED, lead
+from gpca.experiments.cause_tables import lead
+from gpca.experiments.diagnosis import JUDGED, TRAINED
 from gpca.experiments.shifts import MEAN, reached
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.io.frame import Frame, Series

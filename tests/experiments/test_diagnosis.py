@@ -9,7 +9,6 @@ from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL
 from gpca.errors import InputError
 from gpca.evaluation.measures import POOLED, read_clustered, write_metrics
 from gpca.experiments import diagnosis
-from gpca.experiments.leads import trained_rivals
 from gpca.experiments.sample_strata import collect_strata, strata_of, table9_shown, table9_strata
 from tests.experiments.runs import run_with
 from tests.judged import random_judged, write_run
@@ -98,7 +97,7 @@ def test_a_lead_is_over_the_best_that_is_trained_and_reads_no_reenactment():
     skills = {"reenact": 0.2, "reenact_committee": 2.0, "pair_forest": 0.1, "committee_further": 0.5, "rule": 0.0}
     judged = {name: random_judged(200, skill=skill) for name, skill in skills.items()}
     samples = {"tiny": judged | {CEILING: judged["rule"]}}
-    rows = diagnosis.compared_by_source(samples, against={"trained": trained_rivals})
+    rows = diagnosis.compared_by_source(samples, against={"trained": diagnosis.trained_rivals})
     rows = rows[rows["metric"] == "balanced_accuracy"].set_index(["method", "against"])
     assert rows.loc["reenact", "trained"]["other"] == "committee_further"
     assert rows.loc["reenact", "trained"]["value"] < 0 < rows.loc["reenact_committee", "trained"]["value"]

@@ -7,7 +7,7 @@ import pytest
 from gpca.declarations.plan import Run
 from gpca.evaluation.intervals import wilson_interval
 from gpca.evaluation.measures import ALL, read_clustered, write_metrics
-from gpca.experiments.frame_accuracies import collect, collect_intervals
+from gpca.experiments.frame_tables import collect, collect_intervals
 from gpca.experiments.frames import read_together
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD
 from gpca.io.csv_file import write_csv

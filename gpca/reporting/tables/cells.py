@@ -1,20 +1,15 @@
 """Makes the cells of tables: means over seeds, shares of samples, and values that have their interval already."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from math import isfinite, isnan, nan
-from typing import TYPE_CHECKING
 
 from gpca.evaluation.intervals import mean_interval, wilson_interval
+from gpca.io.frame import Frame, Series
 from gpca.reporting.tables.table import LEAST_SEEDS, SHARE, Cell, Column
 
-if TYPE_CHECKING:
-    import pandas as pd
 
-
-def where(frame: pd.DataFrame, entries: Mapping[str, object]) -> pd.DataFrame:
+def where(frame: Frame, entries: Mapping[str, object]) -> Frame:
     """Return the rows of a frame with these entries; a column that it lacks is empty."""
     for column, value in entries.items():
         if column in frame:
@@ -24,7 +19,7 @@ def where(frame: pd.DataFrame, entries: Mapping[str, object]) -> pd.DataFrame:
     return frame
 
 
-def rows_where(frame: pd.DataFrame, **wanted: object) -> pd.DataFrame:
+def rows_where(frame: Frame, **wanted: object) -> Frame:
     return where(frame, wanted)
 
 
@@ -80,7 +75,7 @@ def _farther_bounds(cell: Cell, trials: int) -> tuple[float, float]:
     return max(least, min(cell.mean - half_width, low)), min(most, max(cell.mean + half_width, high))
 
 
-def interval_cell(row: pd.Series, value: str = "value", bounds: Sequence[str] = ("low", "high"), factor: float = 100):
+def interval_cell(row: Series, value: str = "value", bounds: Sequence[str] = ("low", "high"), factor: float = 100):
     """Return the cell of a row that has its interval in two columns of it, and ``seeds`` and ``samples``."""
     low, high = (factor * row[name] for name in bounds)
     finite = (low, high) if isfinite(low) and isfinite(high) else None
