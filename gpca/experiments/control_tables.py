@@ -12,6 +12,7 @@ from gpca.experiments.cause_tables import COUNTS, rule_near_chance
 from gpca.experiments.controls import CALLS, OF_TRIVIAL, RIVAL, SECTION, USUAL
 from gpca.explainers.registry import explainer_entry
 from gpca.reporting.figures import style
+from gpca.reporting.figures.panels import legend_below, panels
 from gpca.reporting.figures.style import SMALL_PT
 from gpca.reporting.sheet import Sheet, Show, crossed, plain_cell, plural, rows_where, show, span, with_label
 from gpca.steps import control_samples as samples_of
@@ -127,8 +128,6 @@ LOOKS = {"rule": "black", "gpca": style.BLUE, "gpca_pair": style.GREEN, "pair_fo
     **INTERVALS,
 )
 def loophole(run: Run, intervals) -> Figure:
-    from gpca.reporting.figures.panels import legend_below, panels
-
     source = POOLED if len(run.sources) > 1 else next(iter(run.sources))
     rows = rows_where(intervals, source=source, metric="accuracy", against="")
     rows = rows[rows["concept"].isin([ALL, POOLED])]

@@ -21,6 +21,8 @@ from gpca.guarantee import answers as asked_for
 from gpca.guarantee.answers import COVERAGE, FALSE_ALARMS, FAMILIES, MISSED, SHARES, SINGLE, SIZE, UNSURE
 from gpca.guarantee.guarantee import STATES
 from gpca.io.csv_file import read_numbers
+from gpca.reporting.figures.panels import in_lines, legend_below, panels
+from gpca.reporting.figures.style import BLUE, COLUMN_WIDTH_IN, GRAY, GREEN, PURPLE, SMALL_PT, VERMILION
 from gpca.reporting.sheet import Row, Sheet, Show, crossed, show, where
 from gpca.seeds import generator
 from gpca.settings import Distinct, read_settings
@@ -240,9 +242,6 @@ def table19_shift(run: Run, measured):
 )
 def guarantee(run: Run, measured):
     from matplotlib.lines import Line2D
-
-    from gpca.reporting.figures.panels import in_lines, legend_below, panels
-    from gpca.reporting.figures.style import BLUE, COLUMN_WIDTH_IN, GRAY, GREEN, PURPLE, SMALL_PT, VERMILION
 
     looks = {  # variant -> label, color, marker, distance below the middle of the row
         asked_for.PLAIN: ("not calibrated", VERMILION, "x", -0.35),

@@ -12,6 +12,7 @@ from gpca.errors import InputError
 from gpca.evaluation.measures import ALL, Clustered, intervals, read_samples, tidy
 from gpca.io.csv_file import numbers as number_column
 from gpca.io.csv_file import read_numbers
+from gpca.reporting.figures.panels import in_lines, legend_below, panels
 from gpca.reporting.figures.style import BLACK, BLUE, COLUMN_WIDTH_IN, GRAY, ORANGE
 from gpca.reporting.sheet import Row, Sheet, show
 from gpca.settings import Distinct
@@ -132,8 +133,6 @@ def table4_kernels(run: Run, intervals):
 def kernel_learning_curves(run: Run, grid) -> Figure:
     from matplotlib.lines import Line2D
     from matplotlib.ticker import NullLocator
-
-    from gpca.reporting.figures.panels import in_lines, legend_below, panels
 
     shown = {name: title for name, title in titles(run).items() if (grid["source"] == name).any()}
     if not shown:

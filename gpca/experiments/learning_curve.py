@@ -9,6 +9,8 @@ from gpca.errors import InputError
 from gpca.evaluation.measures import read_samples, tidy
 from gpca.experiments.diagnosis import FURTHER
 from gpca.io.csv_file import read_numbers
+from gpca.reporting.figures.panels import in_lines, legend_below, panels
+from gpca.reporting.figures.style import BLUE, COLUMN_WIDTH_IN, GRAY, ORANGE
 from gpca.settings import read_settings
 from gpca.steps.learning_curve import CURVE_COLUMNS, MEASURED, CurveSettings, labeled_samples
 
@@ -86,9 +88,6 @@ GUESSING = 25.0  # balanced accuracy in %, of four labels
 )
 def learning_curve(run: Run, curves):
     from matplotlib.ticker import NullLocator
-
-    from gpca.reporting.figures.panels import in_lines, legend_below, panels
-    from gpca.reporting.figures.style import BLUE, COLUMN_WIDTH_IN, GRAY, ORANGE
 
     lines = {"trees": ("Extremely randomized trees", BLUE), "gpca": ("GP-CA's classifier", ORANGE)}
     rows = {"balanced_accuracy": "balanced accuracy (%)", "regret": "regret (%)"}

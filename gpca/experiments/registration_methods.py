@@ -21,7 +21,6 @@ from gpca.io.csv_file import read_csv, read_numbers
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.sheet import Row, Sheet, show
-from gpca.reporting.tables.builder import missing_packages
 from gpca.steps.registration_trials import INITIAL, NO_START, SEVERITY_COLUMNS, PairSettings
 
 NAME = "registration_methods"
@@ -278,6 +277,7 @@ def method_rows(names: Iterable[str], global_start: str, initial: str = "Initial
 
 
 def missing_methods(names: Iterable[str]) -> list[str]:
-    return missing_packages(
-        {registry.method_entry(name).title: package for name, package in registry.left_out(names).items()}
-    )
+    """Footnote on methods whose package is not installed, if there are any."""
+    absent = registry.left_out(names).items()
+    needs = ", ".join(f"{registry.method_entry(name).title} needs the package {package}" for name, package in absent)
+    return [f"Left out, as the package is not installed: {needs}."] if needs else []

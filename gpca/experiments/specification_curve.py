@@ -21,6 +21,8 @@ from gpca.explainers.registry import explainer_module
 from gpca.frames.source import REAL_WORLD, conditions_of
 from gpca.objects.entry import stand_in_clause
 from gpca.pairs.perturbation import Severities
+from gpca.reporting.figures.panels import panels
+from gpca.reporting.figures.style import BLUE, LIGHT_GRAY, SMALL_PT, write_title
 from gpca.reporting.sheet import Cell, Column, Table, TableBuilder, plain_cell, rows_where
 from gpca.settings import Keys
 from gpca.steps.readings import groups
@@ -291,9 +293,6 @@ MOST_ACROSS = 12  # numbers that stand beside each other in a bin of the figure
 )
 def draw_readings(run: Run, judged: Frame) -> Figure:
     """Share of close readings as a dot for each group and number; dots of one share stand side by side."""
-    from gpca.reporting.figures.panels import panels
-    from gpca.reporting.figures.style import BLUE, LIGHT_GRAY, SMALL_PT, write_title
-
     shares = unresolved(judged).groupby(["group", *NUMBER], sort=False)["close"].mean()
     groups = [name for name in GROUPS if name in shares.index.unique("group")]
     if not groups:

@@ -101,9 +101,3 @@ def cautious_over(seeds: int, samples: int) -> str:
     bounds = wilson if seeds < LEAST_SEEDS else f"the farther bounds of that and of {wilson}"
     over = mean_over(seeds, samples).replace("there is no", "all else has no")
     return f"{over}. In brackets, of accuracies, of which no single answers are kept: {bounds}"
-
-
-def missing_packages(left_out: Mapping[str, str]) -> list[str]:
-    """Return the footnote on methods whose package is not installed, if there are any."""
-    needs = ", ".join(f"{title} needs the package {package}" for title, package in left_out.items())
-    return [f"Left out, as the package is not installed: {needs}."] if needs else []
