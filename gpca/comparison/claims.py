@@ -16,7 +16,7 @@ from gpca.attribution.predictions import read_predictions
 from gpca.comparison.published import UNITS, Counterpart
 from gpca.comparison.values import RUNTIME, ShareDraws, runtime_mean, values_by_seed
 from gpca.comparison.verdicts import INCONCLUSIVE, NOT_COMPARABLE, NOT_RUN
-from gpca.evaluation.intervals import NO_WIDTH, mean_interval, student_factor
+from gpca.evaluation.intervals import ANYTHING, NO_WIDTH, mean_interval, student_factor
 from gpca.evaluation.measures import ALL, TIDY_COLUMNS, source_method_seed
 from gpca.io.csv_file import read_numbers
 from gpca.io.frame import Frame
@@ -310,11 +310,13 @@ _TESTS = {"greater": "greater", "less": "less", "not_worse": "not worse", "equiv
 
 
 @dataclass(frozen=True)
-class DifferenceColumn(Column):
-    """Shows a difference, or a factor, with the bounds of its interval and three digits."""
+class ThreeDigits(Column):
+    """Shows numbers of any unit with three digits, with the bounds of the interval where there is one."""
+
+    limits: tuple[float, float] = ANYTHING
 
     def text(self, cell: Cell) -> str:
-        """Return e.g. ``-1.2 (-2.1 to 0.3)``."""
+        """Return e.g. ``-1.2 (-2.1 to 0.3)``, or ``0.592``."""
         low, high = cell.bounds or (math.nan, math.nan)
         interval = "" if math.isnan(low) else f" ({low:.3g} to {high:.3g})"
         return f"{cell.mean:.3g}{interval}"
@@ -352,7 +354,7 @@ def claims(verdicts: Frame, sources: Mapping[str, Mapping], titles: Mapping[str,
     return table.build(
         caption="What the paper says in sentences, and whether the differences in this run support it",
         column_head="quantity",
-        columns={"difference": DifferenceColumn("First minus second, or their ratio", limits=(-math.inf, math.inf))},
+        columns={"difference": ThreeDigits("First minus second, or their ratio")},
         footnotes=(
             counted(verdicts),
             f"In brackets: the 95 % interval over {seeds} of differences of the same seed, or of accuracies the "

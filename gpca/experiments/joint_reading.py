@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from gpca.comparison import joint_reading as joint
+from gpca.comparison.claims import ThreeDigits
 from gpca.comparison.joint_reading import DEVELOPMENT, EVALUATED, EVALUATION, JUDGED, PROTOCOL, SEVERITIES
 from gpca.comparison.published import read_published
 from gpca.comparison.readings import read_judged
@@ -15,7 +16,7 @@ from gpca.errors import InputError
 from gpca.evaluation.measures import read_all_metrics, read_metrics, tidy
 from gpca.experiments import reading_words
 from gpca.experiments.active_learning import learning_settings
-from gpca.experiments.specification_curve import Plain, plain_cells, retrained_on, stand_ins
+from gpca.experiments.specification_curve import plain_cells, retrained_on, stand_ins
 from gpca.explainers.registry import explainer_module
 from gpca.io.csv_file import ANY, read_csv
 from gpca.objects.entry import Name, SourceEntry, title_of
@@ -214,7 +215,7 @@ def table16_joint_reading(run: Run, verdicts: Frame, scores: Frame, choice: Fram
     return table.build(
         "The paper's Tables I to V under one reading of all that they leave open" + stand_ins(run),
         "value",
-        {name: Plain(title) for name, title in COLUMNS.items()},
+        {name: ThreeDigits(title) for name, title in COLUMNS.items()},
         (
             f"The joint reading: {words}. It was found on {development}; the paper states none.",
             sentence(DEVELOPMENT, EVALUATED, "There, of what is printed of the source that they stand for"),

@@ -9,10 +9,10 @@ from typing import Annotated, Any, get_args
 
 import numpy as np
 
+from gpca.comparison.claims import ThreeDigits
 from gpca.comparison.readings import read_judged, summarize, unresolved
 from gpca.declarations import Experiment, Figure, Frame, Names, Plan, Run, Step, Tidy, figure, table
 from gpca.errors import InputError
-from gpca.evaluation.intervals import ANYTHING
 from gpca.experiments import reading_words
 from gpca.experiments.active_learning import learning_settings
 from gpca.experiments.explained import explainer_settings
@@ -201,17 +201,6 @@ RETRAIN = Step(
 )
 
 
-@dataclass(frozen=True)
-class Plain(Column):
-    """Column of numbers with three digits, whatever their unit, e.g. ``0.592``."""
-
-    interval: bool = False
-    limits: tuple[float, float] = ANYTHING
-
-    def text(self, cell: Cell) -> str:  # noqa: D102
-        return f"{cell.mean:.3g}"
-
-
 def plain_cells(values: Mapping[str, float], seeds: float) -> dict[str, Cell | None]:
     """Cells of numbers that are means over these seeds, none where there is no number."""
     return {name: None if math.isnan(x) else plain_cell(float(x), int(seeds), 0) for name, x in values.items()}
@@ -261,7 +250,7 @@ def table13_readings(run: Run, judged: Frame) -> Table:
             table.add_row(labels, plain_cells(values, rows.loc[rows["group"] == group, "n"].max()))
             every.append(of)
     inside = [of for of in every if of.inside]
-    columns: dict[str, Column] = {name: Plain(title) for name, title in COLUMNS.items()}
+    columns: dict[str, Column] = {name: ThreeDigits(title) for name, title in COLUMNS.items()}
     return table.build(
         "The numbers that are not reproduced, under other readings of what the paper leaves unstated" + stand_ins(run),
         "value",
