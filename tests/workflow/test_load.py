@@ -1,4 +1,3 @@
-import inspect
 import re
 import shlex
 from argparse import ArgumentParser
@@ -11,7 +10,6 @@ from gpca.config.check import check
 from gpca.config.layers import without_false
 from gpca.declarations.registry import results_of
 from gpca.experiments.run import names_of
-from gpca.process.registry import load
 
 from ..config.configs import load as load_config
 from ..documents import commands
