@@ -157,10 +157,7 @@ def _shares(
     for k, close in enumerate(closes):  # those that depend on the same choices are added up before the whole grid is
         weighted = weight_K[k] * close[printed_K[k]]
         by_shape[weighted.shape] = by_shape.get(weighted.shape, 0) + weighted
-    share_G = np.zeros(shape)
-    for part in by_shape.values():
-        share_G += part
-    return share_G
+    return sum(by_shape.values(), np.zeros(shape))
 
 
 def scores(

@@ -17,17 +17,9 @@ from gpca.declarations import Experiment, Frame, LeftOut, Names, Paths, Plan, Ru
 from gpca.errors import InputError, with_key
 from gpca.evaluation.intervals import ANYTHING, GUESSES, REPEATS, Clustered
 from gpca.evaluation.measures import POOLED, compared, intervals
+from gpca.experiments import diagnosis
 from gpca.experiments.cause_tables import AGAIN, POINTS, SECTION, SHOWN
-from gpca.experiments.diagnosis import (
-    CAUSES_FILES,
-    FURTHER,
-    JUDGED,
-    TABLE,
-    TRAINED,
-    cause_titles,
-    explaining_modules,
-    trained_rivals,
-)
+from gpca.experiments.diagnosis import JUDGED, TRAINED
 from gpca.explainers.registry import CAUSES, explainer_entry
 from gpca.io.container import require_same_samples
 from gpca.reporting.sheet import Cell, Row, Sheet, Show, plain_cell, plural, rows_where, show
@@ -115,7 +107,7 @@ DIAGNOSE = Step(
         **{name: f"{name}/{{*source}}/seed{{seed}}.npz" for name in EACH},
         "encoders": "cause_encoders/{*source}/seed{seed}.pt",
         "embeddings": "cause_embeddings/{*source}/seed{seed}.npz",
-        "further": FURTHER,
+        "further": diagnosis.FURTHER,
         **{
             f"shifted_{name}": files.replace("{shift}", "{*shift}").replace("{*shift_seed}", "{seed}")
             for name, files in EACH.items()
@@ -127,14 +119,14 @@ DIAGNOSE = Step(
         "explainers": {name: plan.config["diagnosis"]["explainers"][name] for name in plan.config[NAME]["explainers"]},
     },
     params={"source": NAME, "sources_asked": lambda plan, wildcards: list(plan.config[NAME]["sources"])},
-    modules=lambda plan: explaining_modules(plan, plan.config[NAME]["explainers"]),
+    modules=lambda plan: diagnosis.explaining_modules(plan, plan.config[NAME]["explainers"]),
 )
 
 
 @numbers(
     "shifts.csv",
     prediction_files="cause_shifts/diagnoses/seed{shift_seed}.csv",
-    causes_files=CAUSES_FILES.replace("{source}", "{shift_source}").replace("{seed}", "{shift_seed}"),
+    causes_files=diagnosis.CAUSES_FILES.replace("{source}", "{shift_source}").replace("{seed}", "{shift_seed}"),
     shifted_files="cause_shifts/{shift}/causes/{shift_source}/seed{shift_seed}.npz",
 )
 def collect(run: Run, prediction_files: Paths, causes_files: Paths, shifted_files: Paths) -> Frame:
@@ -180,8 +172,8 @@ def measured(judged: Mapping[str, Mapping[str, Judged]]) -> list[tuple]:
         how, subset = MEASURES[metric], draws.subset(inside_N & counted(whole, metric))
         value = {name: of[part][metric] for name, of in values.items() if metric in of[part]}
         limits = ANYTHING if part == DROP else how.limits
-        against = {} if part == DROP else {TRAINED: trained_rivals}
-        rows += compared((TABLE, POOLED), metric, part, value, subset, limits, against, how.least_is_best)
+        against = {} if part == DROP else {TRAINED: diagnosis.trained_rivals}
+        rows += compared((diagnosis.TABLE, POOLED), metric, part, value, subset, limits, against, how.least_is_best)
     return rows
 
 
@@ -243,7 +235,7 @@ def knows(name: str) -> str:
     measures="shifts.csv",
 )
 def table9_shift(run: Run, measures):
-    explainers, titles = cause_titles(run.config), shifts(run.config)
+    explainers, titles = diagnosis.cause_titles(run.config), shifts(run.config)
     names, shown = run.config[NAME]["explainers"], ", ".join(titles.values())
     rows = [Row([(name, explainers[name]), (knows(name),) * 2], {"method": name}) for name in names]
     rows.append(Row([(CEILING, AGAIN[CEILING]), ("truth",) * 2], {"method": CEILING}, rival=False))
