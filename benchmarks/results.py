@@ -83,11 +83,11 @@ def start_angle_deg(causes: Causes, row: int) -> float:
 
 def judge_unseen(samples: TrainingSet, tolerance: float) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Return scores (N,) and calls (N,) of each method, by what learned and was calibrated on other families."""
-    evidence, off_N = samples.evidence, samples.shown_error_N > tolerance
+    off_N = samples.shown_error_N > tolerance
     fixed = {
-        UNTRAINED: ResultJudge.untrained().probability(evidence, tolerance),
-        "fitness": -evidence.fitness_N,
-        "inlier_rmse": evidence.inlier_rmse_N,
+        UNTRAINED: ResultJudge.untrained().probability(samples, tolerance),
+        "fitness": -samples.fitness_N,
+        "inlier_rmse": samples.inlier_rmse_N,
     }
     scores = {name: score_N.astype(float) for name, score_N in fixed.items()} | {JUDGE: np.empty(len(off_N))}
     calls = {name: np.empty(len(off_N), object) for name in scores}

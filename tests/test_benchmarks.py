@@ -224,7 +224,8 @@ def test_results_of_unseen_families_are_judged_by_what_learned_and_was_calibrate
     random, n = np.random.default_rng(0), 400
     error_N = np.exp(random.uniform(np.log(0.003), np.log(0.4), size=n))
     samples = TrainingSet(
-        *(np.zeros((n, 1)), np.full(n, "pose"), np.full(n, "pose"), np.ones((n, 3), bool)),
+        features_N_F=np.zeros((n, 1)), causes_N_3=np.ones((n, 3), bool),
+        label_N=np.full(n, "pose"), dominant_N=np.full(n, "pose"),
         shown_error_N=error_N, family_N=np.arange(n) % 8,
         distance_N_K=(error_N * np.exp(0.1 * random.normal(size=n)))[:, None],
         weight_N_K=np.ones((n, 1)), inlier_rmse_N=random.random(n), fitness_N=random.random(n),

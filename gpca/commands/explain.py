@@ -56,9 +56,8 @@ class Inputs:
         """Return the arguments of the function that explains; InputError for a fault of a file."""
         T_init = read_pose(self.start) if self.start else None
         source = read_points(self.source)
-        given: dict[str, Any] = {"source_points": source, "T_target_source_init": T_init, "unit": self.unit}
-        if self.source_unit not in (None, self.unit):
-            given["source_unit"] = self.source_unit
+        given: dict[str, Any] = {"source_points": source, "T_target_source_init": T_init}
+        given |= {"unit": self.unit, "source_unit": self.source_unit}
         target, frame = read_target(self.target)
         if frame is not None:
             extents = extent(measured(source, self.source)), extent(measured(target, self.target))
@@ -245,16 +244,22 @@ def run_explain(options: Namespace) -> int:
 
 
 def _of_scans(options: Namespace) -> Callable[..., ExplainedRegistration]:
+    from gpca.model.result import Tolerance
     from gpca.model.scan_explainer import explain_scans, repair_scans
 
     asked: dict[str, Any] = {}
     if options.estimator or options.uncertainty:
         asked["estimator"] = options.estimator or "monte_carlo"
+    if options.tolerance is not None:  # scans have no diameter for a share or an angle
+        tolerance = Tolerance.parse(options.tolerance)
+        if tolerance.unit not in METERS_PER_UNIT:
+            fault = f"'{options.tolerance}' is no length, and scans have no diameter"
+            raise InputError("--tolerance", fault, "give one such as 0.2m")
+        asked["limit"] = tolerance.value * METERS_PER_UNIT[tolerance.unit] / METERS_PER_UNIT[options.unit]
     return partial(
         repair_scans if options.repairs_alone else explain_scans,
         voxel=options.voxel,
         method=options.method,
-        limit=None if options.tolerance is None else _length(options.tolerance, options.unit),
         T_target_source=None if options.pose is None else read_pose(options.pose),
         **asked,
     )
@@ -279,16 +284,6 @@ def _of_objects(options: Namespace, explainer: Explainer) -> Callable[..., Expla
 
 
 run_repair = run_explain
-
-
-def _length(text: str, unit: str) -> float:
-    """Return the tolerance of scans in the unit of the points; they have no diameter for a share or an angle."""
-    from gpca.model.result import Tolerance
-
-    tolerance = Tolerance.parse(text)
-    if tolerance.unit not in METERS_PER_UNIT:
-        raise InputError("--tolerance", f"'{text}' is no length, and scans have no diameter", "give one such as 0.2m")
-    return tolerance.value * METERS_PER_UNIT[tolerance.unit] / METERS_PER_UNIT[unit]
 
 
 def _require_options(options: Namespace) -> None:

@@ -33,7 +33,6 @@ CARD = Path(__file__).with_name("card.md")  # template
 REMEDY = "ship a model from the folder of the run that made it"
 _TRAINING_FILE = re.compile(r"/(model_causes|registrations)/([^/]+)/seed\d+\.npz$")  # among the inputs of a model
 
-
 License = tuple[str, str, str]  # dataset, license, and where it was read
 
 

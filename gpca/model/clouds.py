@@ -212,11 +212,10 @@ class Familiarity:
         for name in MEASURES:
             values = np.array([measures[name] for measures in measured])
             values = values[np.isfinite(values)]
-            ends = (0.0, np.inf)
-            if len(values):
-                ends = np.quantile(values, ((1 - SHARE) / 2, (1 + SHARE) / 2)).tolist()
+            tails = (1 - SHARE) / 2, (1 + SHARE) / 2
+            low, high = np.quantile(values, tails).tolist() if len(values) else (0.0, np.inf)
             margin = SIZE_MARGIN if name == "size" else 1.0
-            ranges[name] = ends[0] / margin, ends[1] * margin
+            ranges[name] = low / margin, high * margin
         return cls(ranges)
 
     def warnings(self, source: np.ndarray, target: np.ndarray) -> tuple[list[str], list[str]]:

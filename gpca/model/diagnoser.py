@@ -19,7 +19,7 @@ from gpca.evaluation.conformal import highest_level
 from gpca.evaluation.intervals import interval, pigeonhole_weights, weighted_mean
 from gpca.explainers.pair_classifier import Judgment, PairClassifier
 from gpca.guarantee.guarantee import SEVERAL, Guarantee, calibrate
-from gpca.io.container import Container, array
+from gpca.io.container import array
 from gpca.model.diagnosis import Diagnosis, Guaranteed, Reenacted, state_probabilities
 from gpca.model.result import DEFAULT_TOLERANCE, TOLERANCES, UNCALIBRATED, Calibrated, Evidence, ResultJudge, level_at
 from gpca.pairs.distances import ObservedPair
@@ -184,8 +184,8 @@ def upgraded(state: Mapping[str, Any]) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class TrainingSet(Container):
-    """N registrations with measured causes."""
+class TrainingSet(Evidence):
+    """N registrations with measured causes, and what is read of their results."""
 
     features_N_F: np.ndarray = array("N F")  # :func:`gpca.reenactment.dataset.reenactment_features`
     label_N: np.ndarray = array("N")  # nominal, a dominant cause, or borderline: by the mean error over the starts
@@ -193,10 +193,6 @@ class TrainingSet(Container):
     causes_N_3: np.ndarray = array("N 3")  # whether each concept is a cause
     shown_error_N: np.ndarray = array("N")  # of the registration itself, diameters
     family_N: np.ndarray = array("N")  # family of the shape
-    distance_N_K: np.ndarray = array("N K")  # as in :class:`gpca.model.result.Evidence`, with the next three
-    weight_N_K: np.ndarray = array("N K")
-    inlier_rmse_N: np.ndarray = array("N")
-    fitness_N: np.ndarray = array("N")
 
     @classmethod
     def of(cls, causes: Causes, reenactments: Reenactments) -> TrainingSet:
@@ -215,18 +211,13 @@ class TrainingSet(Container):
             fitness_N=causes.registrations.fitness,
         )
 
-    @property
-    def evidence(self) -> Evidence:
-        """What is read of the results."""
-        return Evidence(self.distance_N_K, self.weight_N_K, self.inlier_rmse_N, self.fitness_N)
-
     def judge(self) -> ResultJudge:
         """Return a judge that learned from the results."""
-        return ResultJudge.fit(self.evidence, self.shown_error_N, self.features_N_F[:, -DESCRIPTORS:])
+        return ResultJudge.fit(self, self.shown_error_N, self.features_N_F[:, -DESCRIPTORS:])
 
     def probabilities(self, judge: ResultJudge, tolerance: float) -> np.ndarray:
         """Return the probabilities (N,) of the results to be off by more than a tolerance."""
-        return judge.probability(self.evidence, tolerance, self.features_N_F[:, -DESCRIPTORS:])
+        return judge.probability(self, tolerance, self.features_N_F[:, -DESCRIPTORS:])
 
     def states_within(self, tolerance: float) -> np.ndarray:
         """Return the states (N,) of the results; ``borderline`` where too little shape holds a failed one."""

@@ -102,10 +102,8 @@ class Explainer:
             if voids and (scale := diagnosis.reenacted.scale) and scale.off:
                 warnings.append(scale.words)
             if diagnosis.unlikeness > 1:
-                far = (
-                    f"{diagnosis.unlikeness:.1f} times as far from the registrations that the diagnosis was trained on"
-                )
-                warnings.append(f"the pair is {far} as 99 % of these are from one another")
+                far = f"{diagnosis.unlikeness:.1f} times as far from the registrations that the diagnosis was trained"
+                warnings.append(f"the pair is {far} on as 99 % of these are from one another")
             if started and method is None and self._fits_inverted(clouds, outcome):
                 warnings.append("the inverse of the initial pose fits far better: is it T_source_target?")
         moved = Motion.of(T_found, clouds.source, clouds.frame.diameter) if started else None

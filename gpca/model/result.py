@@ -1,12 +1,10 @@
-"""The probability that a pose is off by more than any tolerance, by a re-enactment's hypotheses of the true pose.
-
-It is a logistic regression on numbers relative to the tolerance; trees on descriptors judge registered poses, too.
-"""
+"""The probability that a pose is off by more than any tolerance, by a re-enactment's hypotheses of the true pose."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from math import pi, radians, sin
 from operator import attrgetter
@@ -51,13 +49,10 @@ class Tolerance:
         """Read a text such as ``5mm``, ``2deg`` or ``3%``; an InputError for any other."""
         units = "|".join((SHARE, ANGLE, *METERS_PER_UNIT))
         match = re.fullmatch(rf"(.+?) ?({units})", text.strip())
-        try:
-            tolerance = cls(decimal(match[1]), match[2]) if match else None
-        except ValueError:
-            tolerance = None
-        if tolerance is None or not 0 < tolerance.value < np.inf:
-            raise InputError(f"tolerance '{text}'", "is not positive, or has no unit", TOLERANCE_REMEDY)
-        return tolerance
+        with suppress(ValueError):
+            if match and (value := decimal(match[1])) > 0:
+                return cls(value, match[2])
+        raise InputError(f"tolerance '{text}'", "is not positive, or has no unit", TOLERANCE_REMEDY)
 
     def length(self, target: np.ndarray, diameter: float, unit: str) -> float:
         """Return the distance it allows a point of a target (M, 3) in diameters; of an angle, the mean by a turn."""

@@ -1,8 +1,4 @@
-"""Explains the registration of two scans of any size without a model.
-
-The probability of a failure is a logistic regression, fitted to development scenes (docs/real_world.md), on the weight
-of the poses that are farther from the result than the limit, and on the distance between partners at the result.
-"""
+"""Explains the registration of two scans of any size without a model, as docs/real_world.md has it."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -77,18 +73,15 @@ def explain_scans(
     state = state_of(failure, overlap[0])
     if scans.fills_volume and state == NOMINAL:
         state = NOT_SURE
-    effects, causes = reenacted.effects, tuple[str, ...]()
-    if state != NOMINAL:
-        causes = tuple(
-            name for name in sorted(effects, key=lambda name: -effects[name]) if effects[name] >= ADDS * limit
-        )
+    effects = {} if state == NOMINAL else reenacted.effects
+    by_effect = sorted(effects, key=lambda name: -effects[name])
+    causes = tuple(name for name in by_effect if effects[name] >= ADDS * limit)
     action, reason = decision(state, reenacted, overlap[0], causes)
     if (scale := reenacted.scale) and scale.off and scale.error > limit:
         state, causes, action, reason = FAILED, ("scale",), RESCALE, scale.advice
-    warnings = [VOLUME] if scans.fills_volume else []
-    if overlap[0] < LEAST_OVERLAP:
-        share = f"only {overlap[0]:.0%} of the source lies on the target"
-        warnings.insert(0, f"{share}: wrong poses may fit as well as the right one")
+    little = f"only {overlap[0]:.0%} of the source lies on the target: wrong poses may fit as well as the right one"
+    warnings = [little] if overlap[0] < LEAST_OVERLAP else []
+    warnings += [VOLUME] if scans.fills_volume else []
     moved, spread = None, None
     if T_target_source is None and T_target_source_init is not None:
         moved = Motion.of(T_found, scans.source, frame.diameter)
@@ -204,7 +197,7 @@ def registered_scans(
         require_rigid(T_given, "pose")
         outcome = scans.outcome(frame.pose_inside(T_given @ inverse(T_init)))
     else:
-        outcome = scans.registered() if method is None else scans.registered_by(method)
+        outcome = scans.registered(method)
     if outcome.failure:
         notes.append(f"{method} failed: {outcome.failure}")
     icp = f"{'point_to_point' if scans.flat else 'point_to_plane'}, coarse to fine or fine"

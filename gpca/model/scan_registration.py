@@ -146,12 +146,10 @@ class Scans:
     target: np.ndarray  # (M, 3)
     voxel: float  # edge of a voxel
 
-    def registered(self) -> Outcome:
-        """Register by ICP: point-to-plane, or point-to-point if the scans are flat."""
-        return self.outcome(self._icp.register(self.source, np.eye(4)[None])[0][0])
-
-    def registered_by(self, method: str, seed: int | None = None) -> Outcome:
-        """Register by a method with its default settings, whose lengths are taken as multiples of a voxel."""
+    def registered(self, method: str | None = None, seed: int | None = None) -> Outcome:
+        """Register by ICP, or by a method with its default settings, whose lengths are multiples of a voxel."""
+        if method is None:
+            return self.outcome(self._icp.register(self.source, np.eye(4)[None])[0][0])
         unit = METHOD_UNIT * self.voxel
         pair = self._in_voxels(seed_of("scans", method) if seed is None else seed)
         outcome = make_method(method)(pair)
@@ -223,7 +221,7 @@ class Scans:
         starts_n = exp(xi_n_6 * start_deviation(START_ROTATION_DEG, START_TRANSLATION))
         T_n = [T_found, *self._icp.register(_drawn(self.source, RUN_POINTS, "runs"), starts_n)[0]]
         if not self.flat:  # features are those of surfaces
-            by_features = [self.registered_by("fpfh_ransac", seed_of("scans", run)) for run in range(GLOBAL_RUNS)]
+            by_features = [self.registered("fpfh_ransac", seed_of("scans", run)) for run in range(GLOBAL_RUNS)]
             T_n += [run.T_target_source for run in by_features if run.converged]
         random = generator("scans", "hypotheses")
         T_n += [each.T for each in find_hypotheses(self.few, self.coarse, np.stack(T_n), ReenactmentSettings(), random)]

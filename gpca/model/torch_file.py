@@ -12,12 +12,13 @@ import numpy as np
 from gpca.io.array_tree import require_plausible, require_whole
 
 VERSION = 4
-DTYPES = {
-    "FloatStorage": np.float32,
-    "DoubleStorage": np.float64,
-    "LongStorage": np.int64,
-    "IntStorage": np.int32,
-    "ShortStorage": np.int16,
+NAMES = {
+    "collections.OrderedDict": OrderedDict,
+    "torch.FloatStorage": np.float32,
+    "torch.DoubleStorage": np.float64,
+    "torch.LongStorage": np.int64,
+    "torch.IntStorage": np.int32,
+    "torch.ShortStorage": np.int16,
 }
 
 
@@ -55,13 +56,10 @@ class _Tensors(pickle.Unpickler):
         self._arrays: dict[tuple, np.ndarray] = {}
 
     def find_class(self, module: str, name: str) -> Any:
-        if (module, name) == ("collections", "OrderedDict"):
-            return OrderedDict
-        if (module, name) == ("torch._utils", "_rebuild_tensor_v2"):
-            return self._array
-        if module == "torch" and name in DTYPES:
-            return DTYPES[name]
-        raise ValueError(f"it holds {module}.{name}, which no model does")
+        names = NAMES | {"torch._utils._rebuild_tensor_v2": self._array}
+        if (full_name := f"{module}.{name}") not in names:
+            raise ValueError(f"it holds {full_name}, which no model does")
+        return names[full_name]
 
     def persistent_load(self, pid: Any) -> np.ndarray:
         _, dtype, key, _, count = pid

@@ -108,12 +108,13 @@ def training_set(n, seed, shift=3.0):
     features_N_F = random.normal(size=(n, WIDTH)) + shift * failed_N[:, None]
     label_N = np.where(failed_N, np.where(np.arange(n) % 3 == 1, "noise", "pose"), "nominal")
     return TrainingSet(
-        features_N_F,
-        label_N,
-        np.where(failed_N, label_N, "pose"),
-        np.stack([label_N == concept for concept in ("noise", "pose", "overlap")], axis=1) | failed_N[:, None],
-        np.where(failed_N, 0.2, 0.004),
-        np.array(["box", "can", "cup", "drill"])[np.arange(n) * 4 // n],
+        features_N_F=features_N_F,
+        label_N=label_N,
+        dominant_N=np.where(failed_N, label_N, "pose"),
+        causes_N_3=np.stack([label_N == concept for concept in ("noise", "pose", "overlap")], axis=1)
+        | failed_N[:, None],
+        shown_error_N=np.where(failed_N, 0.2, 0.004),
+        family_N=np.array(["box", "can", "cup", "drill"])[np.arange(n) * 4 // n],
         distance_N_K=np.where(failed_N, 0.2, 0.004)[:, None] * random.uniform(0.5, 2, size=(n, 2)),
         weight_N_K=np.tile([0.8, 0.2], (n, 1)),
         inlier_rmse_N=random.uniform(0.01, 0.05, size=n),
