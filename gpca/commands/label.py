@@ -10,16 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
-from gpca.active_learning.labeling import (
-    LARGEST_BYTES,
-    SKIPPED,
-    LabelFile,
-    Question,
-    Queue,
-    Session,
-    is_queue,
-    require_name,
-)
+from gpca.active_learning import labeling
+from gpca.active_learning.labeling import Question, Queue, Session
 from gpca.attribution.predictions import write_predictions
 from gpca.classifier.scores import Attribution
 from gpca.classifier.settings import GPCSettings
@@ -62,7 +54,7 @@ def run_label(options: Namespace) -> None:
     settings = read_settings(GPCSettings, {"learning_rate": 0.2, "iterations": 150} | options.settings)
     require_file(options.registrations, "no such file", "make it with Snakemake, or by 'gpca explain --queue'")
     whole = zipfile.is_zipfile(options.registrations)
-    queued = whole and is_queue(options.registrations)
+    queued = whole and labeling.is_queue(options.registrations)
     require_apart(options, ["labels", "picture", "predictions", "out"], [model_path(options.model)] if queued else [])
     if not whole:
         raise InputError(options.registrations, "is damaged, or not an npz archive", "make it again")
@@ -89,12 +81,12 @@ def run_label(options: Namespace) -> None:
         for concept in options.known:
             rows = train[registrations.concept[train] == concept][:each]
             start |= {keys[row]: str(registrations.concept[row]) for row in rows}
-    labels = LabelFile(options.labels, dict.fromkeys(keys))
+    labels = labeling.LabelFile(options.labels, dict.fromkeys(keys))
     session = Session(h_S_d, keys, start, labels, settings, options.strategy, gpc=None if model is None else model.gpc)
     answers: TextIO = sys.stdin
     if options.answers is not None:
         remedy = "give a text file in UTF-8 with one answer per line"
-        require_file(options.answers, "no such file", remedy, LARGEST_BYTES)
+        require_file(options.answers, "no such file", remedy, labeling.LARGEST_BYTES)
         with refusing(options.answers, "is not text in UTF-8 ({})", remedy):
             answers = io.StringIO(options.answers.read_text(encoding="utf-8-sig"))
     left = options.questions
@@ -106,7 +98,7 @@ def run_label(options: Namespace) -> None:
             answer = _ask(session, registrations, question, options.picture, answers)
             if answer in (None, "/quit"):
                 return _finish(session, registrations, model, options)
-            labels.add(keys[question.row], SKIPPED if answer == "/skip" else answer)
+            labels.add(keys[question.row], labeling.SKIPPED if answer == "/skip" else answer)
         _retrain(session)
     return _finish(session, registrations, model, options)
 
@@ -147,7 +139,7 @@ def _ask(
             continue
         try:
             if answer not in COMMANDS:
-                require_name(answer)
+                labeling.require_name(answer)
             return answer
         except InputError as fault:
             if not answers.isatty():

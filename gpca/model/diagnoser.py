@@ -298,8 +298,7 @@ def calibrated(
     )
     guarantee = Guarantee(by_family.state_sets, single.failure_alarm, by_family.samples, by_family.families)
     threshold = guarantee.within(threshold_of(result_N[state_N == NOMINAL], false_alarms))
-    off_N = training.shown_error_N > tolerance
-    held_out = alarms(off_N, result_N, threshold, training.family_N)
+    held_out = alarms(training.shown_error_N > tolerance, result_N, threshold, training.family_N)
     return Calibrated(tolerance, threshold, guarantee, held_out=held_out)
 
 

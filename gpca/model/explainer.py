@@ -114,8 +114,8 @@ class Explainer:
         repaired = None
         if repair:
             with _timed(seconds, "repair"):
-                by, found = method if register else GIVEN, () if fast else enactments
-                repaired = Repair.of(self.model, clouds, outcome, by, limit, unit, found)
+                by, searched = method if register else GIVEN, () if fast else enactments
+                repaired = Repair.of(self.model, clouds, outcome, by, limit, unit, searched)
         if repaired is not None and repaired.verdict == REPAIRED and not diagnosis.wrong_scale:
             before = f"the registered one with {repaired.registered_result:.2f}"
             decision = Decision(TAKE, "", f"it is wrong with probability {repaired.result:.2f}, {before}")

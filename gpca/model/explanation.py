@@ -214,7 +214,7 @@ class Explanation(ExplainedRegistration):
 
     def html(self, names: Mapping[str, str] | None = None) -> str:
         """Return a page that needs no other file: both clouds in 3-D, causes, poses, counterfactuals."""
-        scene, explained = self.scene, self.as_dict()
+        scene, explained, inputs = self.scene, self.as_dict(), {"training": self.learned_from} | dict(names or {})
         body = [page.action(explained, self.advice)]
         body += [page.listed("Repair", self.repaired.lines())] if self.repaired else []
         if scene and self.unknown:
@@ -226,9 +226,7 @@ class Explanation(ExplainedRegistration):
         body += [
             page.counterfactuals(scene, self.unit) if scene else "",
             "" if self.unknown else page.as_in_the_paper(explained),
-            page.details(
-                explained, {"training": self.learned_from} | dict(names or {}), self.pose_rows(self.T_target_source)
-            ),
+            page.details(explained, inputs, self.pose_rows(self.T_target_source)),
         ]
         head = page.headline(explained) + page.warnings(self.warnings)
         return page.assembled("Registration explained", head, body, scene, self.unit)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -40,26 +41,24 @@ class Proposed(Container):
     fitness_N_P: np.ndarray = array("N P", least=0, most=1)
     family_N: np.ndarray = array("N", TEXT)
 
-    def evidence(self, column: int) -> Evidence:
-        """What is read of one proposal of each registration."""
-        given = self.distance_N_P_K, self.hypothesis_N_P_K, self.inlier_rmse_N_P, self.fitness_N_P
-        return Evidence(*(values[:, column] for values in given))
+    def evidence(self, place: Any) -> Evidence:
+        """What is read of some proposals, which are given as an index into (N, P)."""
+        arrays = self.distance_N_P_K, self.hypothesis_N_P_K, self.inlier_rmse_N_P, self.fitness_N_P
+        return Evidence(*(values[place] for values in arrays))
 
     def at(self, row: int) -> Proposals:
         """Return the proposals for one registration, without their poses."""
         count = self.error_N_P.shape[1]
-        given = self.distance_N_P_K, self.hypothesis_N_P_K, self.inlier_rmse_N_P, self.fitness_N_P
-        evidence = Evidence(*(values[row] for values in given))
-        return Proposals(np.tile(np.eye(4), (count, 1, 1)), self.weight_N_P[row], evidence)
+        return Proposals(np.tile(np.eye(4), (count, 1, 1)), self.weight_N_P[row], self.evidence(row))
 
     def judge(self) -> ResultJudge:
         """Return a judge that learned from the registered poses."""
-        return ResultJudge.fit(self.evidence(0), self.error_N_P[:, 0])
+        return ResultJudge.fit(self.evidence(np.s_[:, 0]), self.error_N_P[:, 0])
 
     def probabilities(self, judge: ResultJudge, tolerance: float) -> np.ndarray:
         """Return the probability (N, P) of each pose to be off by more than the tolerance."""
         columns = range(self.error_N_P.shape[1])
-        return np.column_stack([judge.probability(self.evidence(column), tolerance) for column in columns])
+        return np.column_stack([judge.probability(self.evidence(np.s_[:, column]), tolerance) for column in columns])
 
     def folds(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Yield rows of some families, and rows of all others."""
@@ -109,14 +108,12 @@ def joined(proposals: Sequence[Proposals], errors: Sequence[np.ndarray], family_
     """Return proposals for N registrations, under as many hypotheses each, with the errors of their poses."""
     columns: list[tuple] = []
     for each, error_n in zip(proposals, errors, strict=True):
-        evidence, count = each.evidence, each.evidence.weight_N_K.shape[1]  # as many as hypotheses, and one
+        count = each.evidence.weight_N_K.shape[1]  # as many as hypotheses, and one
         row_P = np.where(np.arange(count) < len(error_n), np.arange(count), 1)
         # Sums of probabilities may be rounded up.
         weight_P = np.where(np.arange(count) < len(error_n), each.weight_n[row_P], 0).clip(0, 1)
-        given = evidence.distance_N_K, evidence.weight_N_K, evidence.inlier_rmse_N, evidence.fitness_N
-        columns.append((error_n[row_P], weight_P, *(values[row_P] for values in given)))
-    error, weight, distance, hypothesis, rmse, fitness = (np.array(column) for column in zip(*columns, strict=True))
-    return Proposed(error, weight, distance, hypothesis, rmse, fitness, np.asarray(family_N))
+        columns.append((error_n[row_P], weight_P, *each.evidence.subset(row_P).arrays.values()))
+    return Proposed(*map(np.array, zip(*columns, strict=True)), family_N=np.asarray(family_N))
 
 
 def with_repair(

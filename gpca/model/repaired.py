@@ -108,7 +108,6 @@ class Repair(ExplainedRegistration):
         lost = round(outcome.fitness * len(clouds.source)) < FEWEST_MATCHES
         level = level_at(diagnoser.levels, tolerance)
         unusual, _ = model.familiar.warnings(clouds.source, clouds.target)
-        scene = Scene(clouds.source, clouds.target, T, frame, model.icp.correspondence_distance, tolerance)
         repaired = cls(
             T_target_source=T_registered,
             T_registered=T_registered,
@@ -122,7 +121,7 @@ class Repair(ExplainedRegistration):
             wrong=None if voids or lost or level.repaired_below is None else WRONG,
             warnings=(*voids, *((LOST,) if lost else ()), *unusual),
             learned_from=model.learning,
-            scene=scene,
+            scene=Scene(clouds.source, clouds.target, T, frame, model.icp.correspondence_distance, tolerance),
         )
         if voids:
             return repaired
@@ -138,8 +137,8 @@ class Repair(ExplainedRegistration):
         if lost:
             hypotheses = pose_posterior(Pair(before, pair.model), diagnoser.reenactment, prior=False)
         elif enactments:
-            found = [enactment.hypothesis for enactment in enactments]
-            hypotheses = np.array([hypothesis.T for hypothesis in found]), weights_of(found)
+            searched = [enactment.hypothesis for enactment in enactments]
+            hypotheses = np.array([hypothesis.T for hypothesis in searched]), weights_of(searched)
         else:
             hypotheses = repair.search(pair, diagnoser.reenactment, surface)
         proposals = repair.propose(clouds.source, surface, T, *hypotheses, refine, measure)

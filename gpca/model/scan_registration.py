@@ -163,11 +163,7 @@ class Scans:
         return Outcome(T, float(near_N.mean()), rmse, failure)
 
     def misfit(self, T: np.ndarray) -> float:
-        """Return how badly both scans fit at a pose: the mean over their points, from 0 to 1.
-
-        The nearest point counts if its normal agrees, by the squared distance from its plane; points where the other
-        scan may have seen nothing count little. Flat scans count by the squared distance, and in full.
-        """
+        """Return how badly both scans fit at a pose: the mean over their points, from 0 to 1 (docs/appendix.md)."""
         source_normals, target_normals = self._normals
         moved = transform(T, self.source)
         turned = None if source_normals is None else rotate(T, source_normals)
