@@ -287,7 +287,6 @@ run_repair = run_explain
 
 
 def _require_options(options: Namespace) -> None:
-
     def refuse(names: Iterable[str], fault: str, remedy: str = "leave it out") -> None:
         for name in names:
             if getattr(options, name) not in (None, False):

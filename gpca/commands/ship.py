@@ -115,7 +115,6 @@ def card(name: str, content: bytes, model: Model, record: Mapping, sources: Sequ
 
 
 def _held_out(head: str, rows: Mapping[str, Mapping[str, float]], measures: Mapping[str, str]) -> str:
-
     def cell(row: Mapping[str, float], name: str) -> str:
         if name not in row:
             return "–"

@@ -113,7 +113,8 @@ def joined(proposals: Sequence[Proposals], errors: Sequence[np.ndarray], family_
         # Sums of probabilities may be rounded up.
         weight_P = np.where(np.arange(count) < len(error_n), each.weight_n[row_P], 0).clip(0, 1)
         columns.append((error_n[row_P], weight_P, *each.evidence.subset(row_P).arrays.values()))
-    return Proposed(*map(np.array, zip(*columns, strict=True)), family_N=np.asarray(family_N))
+    arrays = [*map(np.array, zip(*columns, strict=True)), np.asarray(family_N)]
+    return Proposed(*arrays)
 
 
 def with_repair(

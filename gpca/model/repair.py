@@ -167,10 +167,7 @@ def decide(
     lost: bool = False,
     described_F: np.ndarray | None = None,
 ) -> Verdict:
-    """Return the verdict: a pose that is not called failed stays, another takes its place only if it is called good.
-
-    Else, the fewest most probable poses of which one is right are given; a lost one, away from the target, never stays.
-    """
+    """Return the verdict (docs/repair.md); a `lost` pose, away from the target, never stays."""
 
     def of_set(rows: list[int]) -> float:
         """Return how probably all of these poses, which fit as the first of them does, are off."""

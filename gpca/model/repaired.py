@@ -53,8 +53,8 @@ class OtherPose(FittingPose):
     """A refined hypothesis of the true pose; its `error` is the expected one, as a judge has it."""
 
     off: float  # probability that it is off by more than the tolerance
-    differs: Part | None  # the part of the target that tells it from the first of these poses; None of the first
-    differs_by: float  # mean distance over that part
+    differs: Part | None = None  # the part of the target that tells it from the first of these poses; None of the first
+    differs_by: float = 0.0  # mean distance over that part
 
     def line(self, number: int, unit: str) -> str:
         """One line of text."""
@@ -98,10 +98,7 @@ class Repair(ExplainedRegistration):
         unit: str,
         enactments: Sequence[Enactment] = (),
     ) -> Repair:
-        """Put a registration right, if it is off by more than the limit; enactments of its diagnosis save the search.
-
-        A local method that was named refines the hypotheses; else, the likelihood does by which they were found.
-        """
+        """Put a registration right if it is off by more than the limit; enactments of its diagnosis save the search."""
         frame, T_init, T = clouds.frame, clouds.T_target_source_init, outcome.T_target_source
         diagnoser, tolerance, T_registered = model.diagnoser, limit / frame.diameter, frame.pose_outside(T) @ T_init
         voids = voids_of(clouds.source, clouds.target, 1.0, model.familiar)

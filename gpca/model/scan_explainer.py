@@ -149,8 +149,8 @@ def repair_scans(
     poses = []
     for (pose, weight), failed in zip(others, failure_n[1:], strict=True):
         expected = float((weight_k * weights_and_errors(scans, ranked, pose)[1]).sum())
-        more = {"off": float(failed), "differs": None, "differs_by": 0.0}
-        poses.append(outside(OtherPose.of(pose, weight, expected, T, scans.coarse, **more), frame, T_init))
+        other = OtherPose.of(pose, weight, expected, T, scans.coarse, off=float(failed))
+        poses.append(outside(other, frame, T_init))
     at_pose, T_registered = scans.outcome(T_n[verdict.row]), frame.pose_outside(T) @ T_init
     repair = Repair(
         T_target_source=T_registered,
