@@ -9,9 +9,8 @@ import numpy as np
 from baselines.gates import Alarm
 from baselines.pair import CLOUDS, WITH_RUNS
 from gpca.causes.dataset import LABELS
-from gpca.causes.descriptors import EVERY, EVERYTHING, RESIDUALS, Columns, seen
+from gpca.causes.descriptors import EVERY, EVERYTHING, QUICK, RESIDUALS, Columns, seen
 from gpca.causes.settings import DENSITIES
-from gpca.causes.training import QUICK
 from gpca.causes.truth import NOMINAL
 from gpca.classifier.settings import GPCArguments, LearningRate
 from gpca.explainers import interface

@@ -1,4 +1,4 @@
-"""Fits the matching of hard samples (gpca/causes/matching.py), and shows what trivial numbers know after it.
+"""Fits the matching of hard samples (gpca/causes/drawing.py), and shows what trivial numbers know after it.
 
     python benchmarks/hard.py draw objects.npz --seed 100 --candidates 0 1000 --out draws/100_0.npz
     python benchmarks/hard.py fit draws/100_*.npz
@@ -60,8 +60,7 @@ def draw(objects_file: Path, seed: int, candidates: range, screened: bool) -> tu
     Those `screened` leave out what the matching so far accepts in no case.
     """
     from gpca.causes.candidate import Registrar, Unmeasurable, draw_applied, draw_candidate
-    from gpca.causes.drawing import ENDS, group_of, state_of
-    from gpca.causes.matching import Matching, numbers_of
+    from gpca.causes.drawing import ENDS, Matching, group_of, numbers_of, state_of
     from gpca.causes.measuring import Measuring, read_subjects
     from gpca.causes.settings import CauseSettings
     from gpca.causes.truth import FAILED
@@ -96,11 +95,11 @@ def draw(objects_file: Path, seed: int, candidates: range, screened: bool) -> tu
 
 
 def fit(numbers_N_F: np.ndarray, cause_N: np.ndarray):
-    """Return the rows of the file of :class:`gpca.causes.matching.Matching`."""
+    """Return the rows of the file of :class:`gpca.causes.drawing.Matching`."""
     import pandas as pd
     from sklearn.linear_model import LogisticRegression
 
-    from gpca.causes.matching import COLUMNS, Matching, terms
+    from gpca.causes.drawing import TERM_COLUMNS, Matching, terms
     from gpca.pairs.perturbation import CONCEPTS
     from gpca.pairs.trivial import TRIVIAL
 
@@ -111,7 +110,7 @@ def fit(numbers_N_F: np.ndarray, cause_N: np.ndarray):
     weights = regression.coef_[[regression.classes_.tolist().index(cause) for cause in CONCEPTS]]
     of_numbers = dict(zip(TRIVIAL, zip(matching.center, matching.scale, strict=True), strict=True))
     rows = [(term, *of_numbers.get(term, ("", "")), *weights[:, i]) for i, term in enumerate(terms())]
-    return pd.DataFrame(rows, columns=list(COLUMNS))
+    return pd.DataFrame(rows, columns=list(TERM_COLUMNS))
 
 
 def check(numbers_N_F: np.ndarray, cause_N: np.ndarray, object_N: np.ndarray, seed: int) -> dict[str, float]:
@@ -121,7 +120,7 @@ def check(numbers_N_F: np.ndarray, cause_N: np.ndarray, object_N: np.ndarray, se
     from sklearn.model_selection import GroupKFold, cross_val_predict
     from sklearn.tree import DecisionTreeClassifier
 
-    from gpca.causes.matching import Matching
+    from gpca.causes.drawing import Matching
     from gpca.explainers.classifiers import standardized_regression
     from gpca.pairs.perturbation import CONCEPTS
     from gpca.seeds import generator

@@ -1,8 +1,11 @@
-"""Descriptors of registered pairs in groups, the file that holds them, and what has to be seen for each."""
+"""Descriptors of registered pairs in groups, their files, what has to be seen for each, and samples to learn from."""
 
-from collections.abc import Collection, Mapping
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from time import perf_counter
+from typing import TypeVar
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -10,11 +13,12 @@ from scipy.spatial import cKDTree
 from gpca.alignment.batched_icp import icp_to
 from gpca.alignment.icp import ICPSettings, clipped_cost
 from gpca.alignment.pose_error import displacements
-from gpca.causes.dataset import Causes
+from gpca.causes.dataset import LABELS, Causes
 from gpca.causes.settings import DENSITIES, GROUPS, MOTION, QUANTILES, REMEDIED, DescriptorSettings
 from gpca.causes.truth import SUBSETS, capped, shapley_values
 from gpca.io.arrays import TEXT, WHOLE
 from gpca.io.container import Container, array
+from gpca.pairs.dataset import Registrations
 from gpca.pairs.distances import ENTROPY, ObservedPair, describe_distances, describe_entropy
 from gpca.pairs.perturbation import NOISE, OVERLAP, POSE
 from gpca.process.progress import progress
@@ -187,3 +191,44 @@ def seen(arrays: Mapping[str, np.ndarray], sees: Collection[str], wanted: Column
         if shown:
             chosen.append(array_N_F[:, np.intersect1d(numbers_F[wanted[group]], np.concatenate(shown))])
     return np.hstack(chosen)
+
+
+QUICK = ("distances", "planes", "motion", "starts")  # groups of descriptors that need no further registration
+
+
+@dataclass(frozen=True)
+class LabeledSamples(Container):
+    """N labeled registrations, nominal or with the dominant cause: the `QUICK` groups of descriptors (N, F)."""
+
+    distances: np.ndarray = array(f"N {WIDTHS['distances']}")
+    planes: np.ndarray = array(f"N {WIDTHS['planes']}")
+    motion: np.ndarray = array(f"N {WIDTHS['motion']}")
+    starts: np.ndarray = array(f"N {WIDTHS['starts']}")
+    concept: np.ndarray = array("N", TEXT, choices=LABELS)
+    cluster: np.ndarray = array("N", TEXT)  # the family
+
+    @classmethod
+    def of(cls, registrations: Registrations) -> LabeledSamples:
+        """Return the labels and quick descriptors of registrations that have both."""
+        groups = {name: registrations.attached[name] for name in QUICK}
+        return cls(**groups, concept=registrations.concept, cluster=registrations.cluster, axes=None)
+
+    @property
+    def attached(self) -> Mapping[str, np.ndarray]:
+        """The groups by name, as explainers read them."""
+        return {name: getattr(self, name) for name in QUICK}
+
+    @property
+    def features(self) -> np.ndarray:
+        """All groups side by side (N, F)."""
+        return np.hstack([*self.attached.values()])
+
+
+Samples = TypeVar("Samples", Registrations, LabeledSamples)
+
+
+def joined_without(families: Sequence[str] | np.ndarray, parts: Iterable[Samples]) -> Samples:
+    """Return the samples of several, but those of families that are tested."""
+    tested = np.asarray(families, str)
+    left = [part.subset(np.flatnonzero(~np.isin(part.cluster, tested))) for part in parts]
+    return left[0] if len(left) == 1 else type(left[0]).joined(left)

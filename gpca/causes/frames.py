@@ -9,9 +9,8 @@ from gpca.causes.candidate import Candidate, Unmeasurable
 from gpca.causes.dataset import Causes
 from gpca.causes.measuring import Measuring, RecordedPair, Subject, found_in, measure_cases, measure_clean_pairs
 from gpca.causes.settings import FEWEST_POINTS, CauseSettings, FrameCauseSettings
-from gpca.frames.instances import Instances
+from gpca.frames.instances import KINDS, Instances, Starts
 from gpca.frames.shots import CleanView, clean_view, rendered_side
-from gpca.frames.starts import KINDS, Starts
 from gpca.objects.camera import MeshScene
 from gpca.objects.canonical import TRAINING, ObjectClouds
 from gpca.pairs.perturbation import CONCEPTS

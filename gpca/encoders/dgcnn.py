@@ -15,9 +15,8 @@ import torch
 from torch import nn
 
 from gpca.encoders import edge_kernels
-from gpca.encoders.groups import take
+from gpca.encoders.groups import BatchNorm, PointLinear, linear, take
 from gpca.encoders.inference import NEGATIVE_SLOPE, WIDTHS, embed_clouds, nearest
-from gpca.encoders.layers import BatchNorm, PointLinear, linear
 
 CHANNELS, MOTION = 7, 5  # numbers per point of a pair, and of ICP's motion when all of it is given
 SCALE = 0.1  # of all channels but the coordinates, so that neighbors in the first graph are neighbors on the surface

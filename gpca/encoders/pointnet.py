@@ -3,8 +3,7 @@
 import torch
 from torch import nn
 
-from gpca.encoders.groups import GroupMLP, Groups, farthest_points, take
-from gpca.encoders.layers import PointLinear
+from gpca.encoders.groups import GroupMLP, Groups, PointLinear, farthest_points, take
 
 STAGES = 4  # of PointNeXt
 

@@ -19,8 +19,8 @@ from gpca.experiments.diagnosis import FURTHER, TABLE, cause_costs, cause_titles
 from gpca.experiments.frames import title_of_frames
 from gpca.explainers.interface import REENACTED
 from gpca.explainers.registry import CAUSES, explainer_entry
+from gpca.frames.instances import CARRIED, KINDS, LADDER, NATIVE, TRANSPLANTED
 from gpca.frames.source import REAL_WORLD
-from gpca.frames.starts import CARRIED, KINDS, LADDER, NATIVE, TRANSPLANTED
 from gpca.io.container import require_same_samples
 from gpca.io.csv_file import ANY, read_csv
 from gpca.objects.canonical import BY_ICP

@@ -187,9 +187,7 @@ def write_objects(
     surfaces: Iterable[Surface], source: str, path: str | Path, n_points: int = 16384, splits: Path | None = None
 ) -> None:
     """Write the canonical clouds of a source, whole or not at all; `splits` is a file of families and folds."""
-    if not (places := read_object_splits(splits, source) if splits else {}):
-        sample_objects(surfaces, source, n_points).save(path, source)
-        return
+    places = read_object_splits(splits, source) if splits else {}
 
     def is_used(surface: Surface) -> bool:
         if surface.name not in places:
@@ -197,9 +195,11 @@ def write_objects(
             raise InputError(f"object '{surface.name}'", "is in no split", remedy)
         return places[surface.name].role != UNUSED
 
-    objects = sample_objects(filter(is_used, surfaces), source, n_points)
-    families, folds = zip(*((places[name].cluster, places[name].fold) for name in objects.names), strict=True)
-    replace(objects, families=np.array(families), folds=np.array(folds)).save(path, source)
+    objects = sample_objects(filter(is_used, surfaces) if places else surfaces, source, n_points)
+    if places:
+        families, folds = zip(*((places[name].cluster, places[name].fold) for name in objects.names), strict=True)
+        objects = replace(objects, families=np.array(families), folds=np.array(folds))
+    objects.save(path, source)
 
 
 def sample_objects(surfaces: Iterable[Surface], source: str, n_points: int = 16384) -> ObjectClouds:

@@ -13,9 +13,8 @@ from gpca.causes.frames import candidate_of_view, outline, subjects_of
 from gpca.causes.measuring import Subject
 from gpca.causes.settings import FEWEST_POINTS, CauseSettings
 from gpca.errors import InputError
-from gpca.frames.instances import Instances
+from gpca.frames.instances import Instances, Starts
 from gpca.frames.shots import MOST_PIXELS, CleanView, Sighting, clean_view, rendered_side
-from gpca.frames.starts import Starts
 from gpca.objects.camera import MeshScene
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.distances import ObservedPair

@@ -7,7 +7,7 @@ from functools import cache, cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gpca.causes.forms import visible_rows
+from gpca.causes.candidate import visible_rows
 
 DIRECTIONS = 150
 FEW, FEW_MODEL = 192, 256  # points of the observed cloud and of the model that are compared

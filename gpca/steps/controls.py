@@ -12,7 +12,7 @@ import pandas as pd
 
 from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import prediction_frame
-from gpca.causes.training import joined_without
+from gpca.causes.descriptors import joined_without
 from gpca.classifier.scores import Attribution
 from gpca.encoders.registry import EncoderSettings
 from gpca.explainers.interface import EMBEDDINGS, REENACTED, Encoding, ExplainerEntry, answer_of

@@ -12,9 +12,8 @@ import numpy as np
 from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import prediction_frame, read_timings, write_predictions, write_timings
 from gpca.causes.dataset import LABELS, Causes, labeled, observed_only
-from gpca.causes.descriptors import Descriptors, describe_all
+from gpca.causes.descriptors import Descriptors, LabeledSamples, describe_all, joined_without
 from gpca.causes.settings import OBJECTS, DescriptorSettings
-from gpca.causes.training import LabeledSamples, joined_without
 from gpca.causes.truth import BORDERLINE
 from gpca.classifier.scores import Attribution
 from gpca.encoders.registry import EncoderSettings

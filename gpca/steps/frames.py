@@ -14,9 +14,8 @@ from gpca.errors import InputError
 from gpca.frames import dataset
 from gpca.frames.dataset import meshes_of, models_of
 from gpca.frames.initial_pose import InitialPoseSettings
-from gpca.frames.instances import Instances, read_instances
+from gpca.frames.instances import Instances, Starts, all_starts, read_instances
 from gpca.frames.rgbd_scene import SceneSettings, stable_poses, write_scenes
-from gpca.frames.starts import Starts, all_starts
 from gpca.frames.synthesis import FrameSettings, make_frame_registrations
 from gpca.io.csv_file import write_csv
 from gpca.jobs.job import Job
@@ -100,8 +99,7 @@ def frame_registrations(job: Job) -> None:
     settings = FrameSettings(**frame_settings, registration=read_settings(RegistrationSettings, registration))
     inputs, name = [job.instances, job.objects], job.get("name", job.source)
     with record_provenance([job.registrations, job.poses, job.timings], inputs, job.settings, seed=job.seed):
-        made = make_frame_registrations(*_instances(job, name), job.source, job.seed, settings)
-        registrations, icp_seconds_S, poses = made
+        registrations, icp_seconds_S, poses = make_frame_registrations(*_instances(job, name), *job.axes, settings)
         replace(registrations, axes=(name, job.seed)).save(job.registrations)
         write_csv(job.poses, poses)
         write_timings(job.timings, registrations, icp_seconds_S, icp_seconds_S)

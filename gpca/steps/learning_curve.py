@@ -9,11 +9,10 @@ import numpy as np
 from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import prediction_frame
 from gpca.causes.dataset import LABELS, Causes, labeled, labels_of
-from gpca.causes.descriptors import describe_motion, describe_starts, observed_pair
+from gpca.causes.descriptors import QUICK, LabeledSamples, describe_plainly, joined_without, observed_pair
 from gpca.causes.drawing import apportion, draw_further
 from gpca.causes.judged import CEILING, Judged, ceiling_of, judged_by, measure
 from gpca.causes.settings import CauseSettings
-from gpca.causes.training import QUICK, LabeledSamples, joined_without
 from gpca.causes.truth import BORDERLINE, GEOMETRY
 from gpca.classifier.scores import Attribution
 from gpca.classifier.settings import GPCSettings
@@ -23,7 +22,6 @@ from gpca.io.frame import Frame
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.objects.canonical import ObjectClouds
-from gpca.pairs.distances import describe_distances
 from gpca.process.progress import progress
 from gpca.seeds import generator, seed_of
 from gpca.settings import Bounds, Count, Distinct, read_settings
@@ -73,12 +71,10 @@ def learning_samples(job: Job) -> None:
 
 def describe(causes: Causes, icp: ICPSettings) -> LabeledSamples:
     """Labels of all rows, and those descriptors that need no further registration."""
-    rows: list[tuple[np.ndarray, ...]] = []
     title = "descriptors of {}, seed {}".format(*(causes.registrations.axes or ("", 0)))
-    for row in progress(range(len(causes)), title):
-        pair = observed_pair(causes, row)  # nothing in these is random
-        rows.append((*describe_distances(pair), describe_motion(pair), describe_starts(pair, icp)))
-    groups: dict[str, Any] = {name: np.array([row[i] for row in rows]) for i, name in enumerate(QUICK)}
+    rows = progress(range(len(causes)), title)
+    described = [describe_plainly(observed_pair(causes, row), icp) for row in rows]  # nothing in these is random
+    groups: dict[str, Any] = {name: np.array([groups[name] for groups in described]) for name in QUICK}
     return LabeledSamples(**groups, concept=labels_of(causes.truth), cluster=causes.registrations.cluster)
 
 

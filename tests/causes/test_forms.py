@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from gpca.causes.candidate import Registrar, draw_candidate, redrawn
+from gpca.causes.candidate import PATCHES, Registrar, draw_candidate, redrawn, smooth_field, visible_rows
 from gpca.causes.drawing import draw_shifted
-from gpca.causes.forms import PATCHES, smooth_field, visible_rows
 from gpca.causes.settings import CauseSettings, CauseSeverities, Form
 from gpca.pairs.perturbation import NOISE, OVERLAP
 

@@ -10,8 +10,8 @@ from gpca.causes.settings import CauseSettings, FrameCauseSettings
 from gpca.causes.truth import ALL, LARGEST_ERROR
 from gpca.errors import InputError
 from gpca.frames.dataset import meshes_of
+from gpca.frames.instances import Starts
 from gpca.frames.shots import clean_view
-from gpca.frames.starts import Starts
 from gpca.objects.canonical import TRAINING
 from tests.frames.bracket import BRACKET, hidden, misplaced, models_in, most_seen, noisy, own_starts
 

@@ -8,8 +8,7 @@ from sklearn.linear_model import LogisticRegression
 
 from benchmarks.hard import fit
 from gpca.causes import drawing
-from gpca.causes.drawing import GIVEN_AWAY, draw_causes
-from gpca.causes.matching import Matching
+from gpca.causes.drawing import GIVEN_AWAY, Matching, draw_causes
 from gpca.causes.settings import CauseSettings
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.trivial import TRIVIAL

@@ -7,9 +7,8 @@ import pytest
 
 from gpca.alignment.icp import ICPSettings
 from gpca.causes.dataset import LABELS
-from gpca.causes.descriptors import describe_all
+from gpca.causes.descriptors import LabeledSamples, describe_all
 from gpca.causes.settings import DescriptorSettings
-from gpca.causes.training import LabeledSamples
 from gpca.explainers.interface import ExplainerEntry, ScoringExplainer
 from gpca.steps.diagnosis import explained
 from gpca.steps.learning_curve import describe

@@ -4,7 +4,7 @@ import pytest
 import torch
 from torch import nn
 
-from gpca.encoders.layers import PointLinear, linear
+from gpca.encoders.groups import PointLinear, linear
 
 
 @pytest.mark.parametrize("shape", [(7, 5), (3, 7, 5), (2, 3, 7, 5)])

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gpca.frames.dataset import Dataset, read_models
-from gpca.frames.starts import Starts
+from gpca.frames.instances import Starts
 
 BRACKET = "bracket"  # no rotation leaves it as it is, so that ADD sees every error
 

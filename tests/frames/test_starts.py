@@ -7,7 +7,7 @@ import pytest
 
 from gpca.errors import InputError
 from gpca.frames.dataset import Dataset, read_models
-from gpca.frames.starts import CARRIED, GLOBAL, LADDER, NATIVE, TRANSPLANTED, Starts, all_starts
+from gpca.frames.instances import CARRIED, GLOBAL, LADDER, NATIVE, TRANSPLANTED, Starts, all_starts
 from gpca.objects.canonical import CARRIED as IS_CARRIED
 from gpca.objects.canonical import Place
 from gpca.rigid import inverse, rotation_angle_rad

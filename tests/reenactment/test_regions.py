@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gpca.causes.forms import visible_rows
+from gpca.causes.candidate import visible_rows
 from gpca.reenactment.surface import before_plane, covered_points
 
 

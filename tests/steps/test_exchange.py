@@ -16,11 +16,18 @@ from gpca.pairs.judge import Judges
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.rigid import exp, transform
 from gpca.seeds import generator
-from gpca.steps.exchange import TOO_FEW, Exchange, ExchangeSettings, registered_by, require_exchangeable
+from gpca.steps.exchange import (
+    OBSERVED,
+    TOO_FEW,
+    Exchange,
+    ExchangeSettings,
+    KnobbedRegistrar,
+    registered_by,
+    require_exchangeable,
+)
 from gpca.uncertainty.designs import ADDITIVE_KNOBS, evaluate_design
 from gpca.uncertainty.estimators import registry as estimator_registry
 from gpca.uncertainty.estimators.interface import EstimatorEntry, FailedEstimate
-from gpca.uncertainty.estimators.substitute import OBSERVED, KnobbedRegistrar
 from gpca.uncertainty.settings import UncertaintySettings
 
 from .six_objects import rival

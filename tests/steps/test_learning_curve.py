@@ -5,11 +5,10 @@ import pytest
 
 from gpca.alignment.icp import ICPSettings
 from gpca.causes.dataset import LABELS
-from gpca.causes.descriptors import describe_all
+from gpca.causes.descriptors import QUICK, LabeledSamples, describe_all
 from gpca.causes.drawing import draw_further
 from gpca.causes.judged import CEILING
 from gpca.causes.settings import CauseSettings, DescriptorSettings
-from gpca.causes.training import QUICK, LabeledSamples
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.steps.learning_curve import CURVE_COLUMNS, LEARNERS, CurveSettings, describe, labeled_samples, learning_curve

@@ -93,7 +93,7 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
         "predictions smoke/causes/ model_causes/ recovery methods/",
     ),
     "gpca/steps/control_samples.py": ("controls/ control_embeddings/ loophole", "predictions embeddings encoders"),
-    "gpca/uncertainty/estimators/substitute.py": ("exchange/ table14_method_matrix", "estimates/ methods/ predictions"),
+    "gpca/steps/exchange.py": ("exchange/ table14_method_matrix", "estimates/ methods/ predictions"),
 }
 
 
