@@ -36,8 +36,7 @@ def require_points(points: np.ndarray, subject: object) -> None:
     """Raise InputError unless `points` is (P, 3), P > 0, finite, and not rounded away by a large offset."""
     if points.ndim != 2 or points.shape[1] != 3 or len(points) == 0:
         raise InputError(subject, "has no points", "fetch or export it again")
-    bad = int((~np.isfinite(points)).any(axis=1).sum())
-    if bad:
+    if bad := int((~np.isfinite(points)).any(axis=1).sum()):
         raise InputError(subject, f"{bad} of {len(points)} points contain NaN or infinity", "fetch or export it again")
     extent, largest_3 = np.linalg.norm(np.ptp(points, axis=0)), np.abs(points).max(axis=0)
     for kind in (np.float32, np.float64):

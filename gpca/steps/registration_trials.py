@@ -162,7 +162,6 @@ def try_each(
 
 
 def timed(function: Callable[..., Result], *arguments: object) -> tuple[Result, float]:
-    """Return the result of a function, and the seconds that it took."""
     started = perf_counter()
     result = function(*arguments)
     return result, perf_counter() - started

@@ -183,7 +183,6 @@ def distances(train_N_F: np.ndarray, query_S_F: np.ndarray, neighbours: int) -> 
 
 
 def principal_components(train_N_d: np.ndarray, query_S_d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Both in the leading principal components of the standardized training embeddings."""
     from sklearn.decomposition import PCA
     from sklearn.pipeline import make_pipeline
     from sklearn.preprocessing import StandardScaler

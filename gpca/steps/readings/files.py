@@ -46,7 +46,6 @@ class RunFiles:
         return self.settings.get(name) or {}
 
     def uncertainty(self) -> UncertaintySettings:
-        """Settings of Monte-Carlo ICP under fixed knobs."""
         runs = fields_of(self.section("uncertainty"), UncertaintySettings)
         return UncertaintySettings(**runs, icp=ICPSettings(**self.section("icp")))
 
@@ -128,7 +127,6 @@ def accuracies_of_named(true_S: np.ndarray, named_S: np.ndarray) -> Values:
 
 
 def table5(true_S: np.ndarray, scores_S_C: np.ndarray, distance_S: np.ndarray) -> Values:
-    """Accuracies and the diagnostics of Table V."""
     return accuracies(true_S, scores_S_C) | diagnostics_of_scores(true_S, scores_S_C, distance_S)
 
 
