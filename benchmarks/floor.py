@@ -24,7 +24,8 @@ from gpca.errors import InputError  # noqa: E402
 from gpca.explainers.registry import explainer_entry  # noqa: E402
 from gpca.pairs.dataset import Registrations  # noqa: E402 (the script runs from a plain checkout)
 from gpca.pairs.perturbation import CONCEPTS  # noqa: E402
-from gpca.uncertainty.designs import DESIGNS, Outcomes  # noqa: E402
+from gpca.uncertainty.designs import DESIGNS  # noqa: E402
+from gpca.uncertainty.outcomes import Outcomes  # noqa: E402
 from gpca.uncertainty.settings import CONDITIONS  # noqa: E402
 from gpca.uncertainty.spread import divergence  # noqa: E402
 

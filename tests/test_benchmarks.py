@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks import floor, pipeline
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.uncertainty.designs import Outcomes
+from gpca.uncertainty.outcomes import Outcomes
 from gpca.uncertainty.settings import CONDITIONS
 
 ROOT = Path(__file__).resolve().parents[1]

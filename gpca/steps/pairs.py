@@ -21,7 +21,8 @@ from gpca.objects.source import data_files, resolve, surfaces
 from gpca.pairs.dataset import Registrations, read_embedding, read_instances_of
 from gpca.pairs.synthesis import RegistrationSettings, make_registrations, read_as
 from gpca.settings import fields_of, read_settings
-from gpca.uncertainty.designs import Outcomes, design_rows, evaluate_design, read_seconds, write_seconds
+from gpca.uncertainty.designs import design_rows, evaluate_design
+from gpca.uncertainty.outcomes import Outcomes, read_seconds, write_seconds
 from gpca.uncertainty.settings import CONDITIONS, UncertaintySettings
 
 EARLIER = ("earlier_seconds", "earlier_icp_seconds")  # spent before an explainer starts

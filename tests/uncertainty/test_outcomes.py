@@ -3,7 +3,7 @@ import pandas as pd
 import pytest
 
 from gpca.errors import InputError
-from gpca.uncertainty.designs import Outcomes, read_seconds, write_seconds
+from gpca.uncertainty.outcomes import Outcomes, read_seconds, write_seconds
 
 COLUMNS = tuple(Outcomes.array_fields())
 S, K = 6, 4
