@@ -34,7 +34,7 @@ class TrivialNumbers:
 
 
 class TrivialClassifier(TrivialNumbers, ClassifierExplainer):
-    """A scikit-learn trivial on the ten trivial numbers."""
+    """A scikit-learn classifier on the ten trivial numbers."""
 
 
 class FittedRule(TrivialNumbers, Rule):

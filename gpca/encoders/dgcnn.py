@@ -15,7 +15,7 @@ import torch
 from torch import nn
 
 from gpca.encoders import edge_kernels
-from gpca.encoders.groups import BatchNorm, PointLinear, linear, take
+from gpca.encoders.groups import BatchNorm, PointLinear, linear
 from gpca.encoders.inference import NEGATIVE_SLOPE, WIDTHS, embed_clouds, nearest
 
 CHANNELS, MOTION = 7, 5  # numbers per point of a pair, and of ICP's motion when all of it is given
@@ -147,7 +147,10 @@ class _EdgeMax(torch.autograd.Function):
 def _edge_max_plain(ac_B_N_2F: torch.Tensor, neighbors_B_N_k: torch.Tensor, norm: nn.BatchNorm1d) -> torch.Tensor:
     """Evaluate the layer with torch operations, on a GPU or of a trained layer."""
     a_B_N_F, c_B_N_F = ac_B_N_2F.chunk(2, dim=-1)
-    y_B_N_k_F = take(a_B_N_F, neighbors_B_N_k) + c_B_N_F[:, :, None]
+    batch, n, _ = neighbors_B_N_k.shape
+    rows_B_N_k = neighbors_B_N_k + n * torch.arange(batch, device=ac_B_N_2F.device)[:, None, None]
+    # Not `take`: on a GPU, the gradient of index_select varies from run to run.
+    y_B_N_k_F = a_B_N_F.flatten(0, 1)[rows_B_N_k] + c_B_N_F[:, :, None]
     activated_E_F = nn.functional.leaky_relu(norm(y_B_N_k_F.flatten(0, 2)), NEGATIVE_SLOPE)
     return activated_E_F.view_as(y_B_N_k_F).amax(dim=2)
 

@@ -38,13 +38,14 @@ RESCALE = "rescale"  # action where source and target differ in scale
 REFINE = "refine"  # action for a given pose from which a registration would succeed
 SURE = 0.5  # probability of a pose from which the advice is to start from it
 LENGTHS = ("apart", "shift", "error", "noise", "noise_floor", "tolerance", "expected_error", "differs_by")  # fields
+AGAIN = "start again from pose 1 (--save-pose writes it)"
 ADVICE = {  # per branch of the policy
     NOTHING: "none",
     "reinitialize": "reinitialize ICP with a broader search",
     "new_view": "change the viewpoint",
     "denoise": "filter the source and check the sensor",
     CHECK: "check what was given",
-    RERUN: "run 'gpca repair' with the same files, or start again from pose 1 (--save-pose writes it)",
+    RERUN: f"run 'gpca repair' in the same way, or {AGAIN}",
     TAKE: "use the repaired pose (--save-pose writes it)",
     REFINE: "register from this pose",
     RESCALE: "rescale the source, or check the units",
@@ -191,9 +192,9 @@ class FittingPose:
     def words(self, unit: str) -> str:
         """Say how far the pose is from the result."""
         if self.registered:
-            return f"the registered pose, within {in_decimals(self.apart)} {unit}"
+            return f"the result, within {in_decimals(self.apart)} {unit}"
         turn = f"{self.turn_deg:.0f}° about {axis_in_words(self.axis)} and " * (self.turn_deg >= SMALL_TURN_DEG)
-        return f"{turn}{in_decimals(self.shift)} {unit} away from the registered pose"
+        return f"{turn}{in_decimals(self.shift)} {unit} away from the result"
 
 
 @dataclass(frozen=True)

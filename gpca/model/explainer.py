@@ -117,7 +117,7 @@ class Explainer:
                 by, searched = method if register else GIVEN, () if fast else enactments
                 repaired = Repair.of(self.model, clouds, outcome, by, limit, unit, searched)
         if repaired is not None and repaired.verdict == REPAIRED and not diagnosis.wrong_scale:
-            before = f"the registered one with {repaired.registered_result:.2f}"
+            before = f"the result with {repaired.registered_result:.2f}"
             decision = Decision(TAKE, "", f"it is wrong with probability {repaired.result:.2f}, {before}")
         elif voids:
             checks = ", ".join(voids.values())

@@ -16,7 +16,7 @@ from gpca.alignment.pose_error import displacements
 from gpca.causes.truth import FAILED, NOMINAL
 from gpca.io.files import whole_file, write_text
 from gpca.model import page
-from gpca.model.diagnosis import ADVICE, CHECK, TAKE, UNKNOWN, Diagnosis, FittingPose, Reenacted, plain
+from gpca.model.diagnosis import ADVICE, AGAIN, CHECK, RERUN, TAKE, UNKNOWN, Diagnosis, FittingPose, Reenacted, plain
 from gpca.model.scene import Scene
 from gpca.numerals import in_decimals
 from gpca.rigid import as_rows, log
@@ -187,6 +187,11 @@ class Explanation(ExplainedRegistration):
     entropy: float
     concept: str  # concept with the largest score (Eq. 6).
     seconds: dict[str, float]  # duration of each stage, and ``total``
+
+    @property
+    def advice(self) -> str:
+        """What to do next, in words; a repair that failed is not advised again."""
+        return AGAIN if self.action == RERUN and self.repaired else super().advice
 
     def _poses(self) -> Sequence[FittingPose]:
         return () if self.unknown else self.diagnosis.reenacted.poses

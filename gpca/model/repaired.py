@@ -190,7 +190,7 @@ class Repair(ExplainedRegistration):
         lines = [f"repair    {self.verdict}: {self.reason}"]
         if self.result is None:
             return lines
-        before = f"; as registered, {self.registered_result:.2f}" if self.verdict == REPAIRED else ""
+        before = f"; before, {self.registered_result:.2f}" if self.verdict == REPAIRED else ""
         lines.append(result_line(self.result, self.tolerance, self.tolerance_share, self.unit) + before)
         if self.verdict == REPAIRED:
             wrong = self.wrong and f"at most {self.wrong:.0%} of repaired poses are wrong"

@@ -58,10 +58,10 @@ def test_poses_are_named_by_where_they_lie_from_the_result(drill):
     assert found.poses[3].shift == pytest.approx(0.05)
     assert sum(pose.probability for pose in found.poses) == pytest.approx(1)
     lines = outside(found, CanonicalFrame(np.zeros(3), 200.0), np.eye(4)).lines("mm")[1:]
-    assert lines[0].startswith("pose 1    probability 0.40: the registered pose, within ")
+    assert lines[0].startswith("pose 1    probability 0.40: the result, within ")
     assert lines[1].startswith("pose 2    probability 0.30: 90° about the target's z axis and ")
-    assert lines[2] == "pose 3    probability 0.20: 20 mm away from the registered pose"
-    assert lines[3].endswith("52° about the target's axis (0.58, 0.58, 0.58) and 10 mm away from the registered pose")
+    assert lines[2] == "pose 3    probability 0.20: 20 mm away from the result"
+    assert lines[3].endswith("52° about the target's axis (0.58, 0.58, 0.58) and 10 mm away from the result")
     # Where the likeliest pose is another, the text says so.
     [line] = said(drill, moved((180, 0, 0))).lines("m")[1:]
     assert line.startswith("pose 1    probability 1.00: 180° about the target's x axis and ")
@@ -73,7 +73,7 @@ def test_a_turn_that_leaves_a_symmetric_object_as_it_is_is_none(cylinder):
     assert same.turn_deg == pytest.approx(0, abs=1e-3)
     assert not along.registered
     assert along.turn_deg == pytest.approx(0, abs=1e-3)
-    assert along.words("m") == "0.1 m away from the registered pose"
+    assert along.words("m") == "0.1 m away from the result"
     assert over.turn_deg == pytest.approx(40)
     upside_down = said(cylinder, moved((180, 0, 0))).poses[0]
     assert upside_down.registered

@@ -12,7 +12,7 @@ import gpca
 from gpca import Explainer
 from gpca.__main__ import main
 from gpca.alignment.pose_error import displacements
-from gpca.model.diagnosis import TAKE
+from gpca.model.diagnosis import RERUN, TAKE
 from gpca.model.repair import GOOD, NOT_REPAIRED, REPAIRED, SEVERAL, Part
 from gpca.model.repaired import STATUSES, side_in_words
 from gpca.model.result import Calibrated, ResultJudge
@@ -66,9 +66,12 @@ def test_a_wrong_pose_is_replaced_by_one_that_is_called_good(wrong, monkeypatch)
 
 def test_nothing_is_replaced_where_the_pose_is_not_called_failed_or_no_other_is_called_good(wrong):
     model, pair, T = wrong
+    explained = replace(Explainer(model, device="cpu").judge(*pair, T), action=RERUN)
     for calibrated, verdict in (((1.1,), GOOD), ((0.5, None, 0.0), NOT_REPAIRED)):
         repair = Explainer(judging(model, *calibrated), device="cpu").repair(*pair, T, register=False)
         assert repair.verdict == verdict
+        advised = replace(explained, repaired=repair)
+        assert "'gpca repair'" in explained.advice and "'gpca repair'" not in advised.advice
         np.testing.assert_array_equal(repair.T_target_source, T)
         assert repair.result == repair.registered_result
         assert "repaired" not in scene_of(repair.html())
