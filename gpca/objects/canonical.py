@@ -18,7 +18,6 @@ from gpca.io.files import is_name
 from gpca.objects.sizes import LARGEST_DIAMETER_M, SMALLEST_DIAMETER_M, require_size
 from gpca.objects.surface import Surface, instance_of, meters_per
 from gpca.process.environment import open3d_cloud, require_open3d
-from gpca.rigid import rigid_motion
 from gpca.seeds import generator
 
 FEWEST_CLOUD_POINTS = 64
@@ -159,13 +158,15 @@ class CanonicalFrame:
 
     def pose_inside(self, T_b_a: np.ndarray) -> np.ndarray:
         """Return a motion (4, 4) of the original frame and unit in this frame."""
-        R = T_b_a[:3, :3]
-        return rigid_motion(R, (T_b_a[:3, 3] + R @ self.center_3 - self.center_3) / self.diameter)
+        inside = T_b_a.copy()
+        inside[:3, 3] = (T_b_a[:3, 3] + T_b_a[:3, :3] @ self.center_3 - self.center_3) / self.diameter
+        return inside
 
     def pose_outside(self, T_b_a: np.ndarray) -> np.ndarray:
         """Return a motion (4, 4) of this frame in the original frame and unit."""
-        R = T_b_a[:3, :3]
-        return rigid_motion(R, self.diameter * T_b_a[:3, 3] + self.center_3 - R @ self.center_3)
+        outside = T_b_a.copy()
+        outside[:3, 3] = self.diameter * T_b_a[:3, 3] + self.center_3 - T_b_a[:3, :3] @ self.center_3
+        return outside
 
 
 def require_cloud_points(points: np.ndarray, subject: object) -> None:

@@ -49,7 +49,7 @@ class ControlSettings:
     hard_sources: Distinct[str] = ()  # that have hard samples
 
     def __post_init__(self) -> None:
-        require_ascending("controls ", self, "draw_points")
+        require_ascending("setting ", self, "draw_points")
 
 
 def left_out(control: str, registrations: Registrations, settings: ControlSettings, backbone: str) -> str | None:

@@ -176,7 +176,7 @@ def test_an_explanation_can_be_printed_in_ascii(tmp_path, model, environment):
     done = gpca(command, **environment)
     assert done.returncode == 0, done.stderr
     assert done.stdout.isascii()
-    assert rb"\xb0, " in done.stdout  # the spread in °
+    assert rb"\xb0 and " in done.stdout  # the spread in °
     assert b"Traceback" not in done.stderr
 
 
