@@ -132,9 +132,10 @@ def _scores(
     from sklearn.ensemble import ExtraTreesClassifier
 
     from gpca.classifier.gpc import GPC
-    from gpca.explainers.classifiers import scores_of
+    from gpca.explainers.classifiers import known_concepts, scores_of
     from gpca.explainers.pair_classifier import NormalizedFeatures
 
+    known_concepts(learned.concept, LABELS)
     if name == "trees":
         state = seed_of(*axes) % 2**32
         forest = ExtraTreesClassifier(TREES, min_samples_leaf=2, max_features=0.3, random_state=state)

@@ -68,6 +68,9 @@ def test_more_samples_than_there_are_cannot_be_learned_from(samples, causes):
     assert set(fewer["samples"]) == {0, 20}
     with pytest.raises(InputError, match="are fewer than the least size, 20; raise"):
         learning_curve(pool.subset(np.arange(19)), tested, truth, SETTINGS, "four", 100)
+    alike = pool.subset(np.flatnonzero(pool.concept == pool.concept[0])[np.zeros(20, int)])
+    with pytest.raises(InputError, match="cover fewer than two concepts"):
+        learning_curve(alike, tested, truth, SETTINGS, "four", 100)
 
 
 def test_chunks_are_even_and_borderline_samples_have_no_label():
