@@ -26,7 +26,7 @@ NOT_COMPARED = (  # made from times, which differ from run to run
 TIMES = "*seconds*"
 LARGEST_BYTES = 3 * 10**7  # of a file of means, ten times the largest
 REMEDY = "regenerate it"
-_COUNTS = "*labels* *epochs* *samples* *delay* *calls* *parameters* clusters predicted_as_* first_* *_wrong"
+_COUNTS = "*labels* *epochs* *samples* *delay* *calls* *parameters* clusters predicted_as_*"
 KINDS = tuple(  # file, metric or column, kind of value; the first that fits
     (file, pattern, kind)
     for file, patterns, kind in (
@@ -35,7 +35,7 @@ KINDS = tuple(  # file, metric or column, kind of value; the first that fits
         ("*", "kl_* nne* nees* *nll* *elbo*", "nats"),
         ("tables/table12_*", "auroc_failed lead", "share"),
         ("*", _COUNTS, "count"),
-        ("*recovery.csv", "episodes tries acted_first actions nominal", "count"),
+        ("*recovery.csv", "episodes tries nominal", "count"),
         ("tables/table5_*", "*aurc augrc brier", "share"),
         ("tables/*", "ece* nominal_calibration", "share"),
         ("tables/*", "*", "percent"),
@@ -45,7 +45,7 @@ KINDS = tuple(  # file, metric or column, kind of value; the first that fits
 )
 SAMPLE_COUNTS = ("test_samples", "episodes")  # metrics that count the samples of the other metrics' shares
 SHARES_OF_RUNS = ("reached", "recognised")  # of the seeds' runs, not of the test samples
-PARTS = ("predicted_as_*", "first_*", "acted_first")  # counts of samples out of these
+PARTS = ("predicted_as_*",)  # counts of samples out of these
 
 
 class Mean(NamedTuple):

@@ -263,8 +263,7 @@ def test_a_config_that_does_not_say_what_agrees_is_named(folders, capsys, tmp_pa
         "share": "metrics:accuracy recovery:recovered_within_3 estimators:coverage_starts registration_methods:add "
         "tables/table12_failures:lead tables/table9_causes:nominal_calibration "
         "tables/table5_learners:ece tables/table5_shift:ece_severity",
-        "count": "metrics:predicted_as_pose active_learning:labels_to_target recovery:first_queue "
-        "tables/table8_recovery:actions tables/table10_controls:paper_auroc_wrong",
+        "count": "metrics:predicted_as_pose active_learning:labels_to_target recovery:tries",
         "correlation": "diagnostics:rho_max_score_knn_analytical_low tables/table12_failures:spearman_error "
         "tables/table5_learners:rho",
         "nats": "diagnostics:nll kernels:elbo estimators:kl_rotation_data estimators:nees_truth",
