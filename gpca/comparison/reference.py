@@ -45,7 +45,6 @@ KINDS = tuple(  # file, metric or column, kind of value; the first that fits
 )
 SAMPLE_COUNTS = ("test_samples", "episodes")  # metrics that count the samples of the other metrics' shares
 SHARES_OF_RUNS = ("reached", "recognised")  # of the seeds' runs, not of the test samples
-PARTS = ("predicted_as_*",)  # counts of samples out of these
 
 
 class Mean(NamedTuple):
@@ -198,6 +197,6 @@ def kind_of(file: str, quantity: str) -> str:
 def _mean(file: str, value: float, half_width: float, quantity: str, samples: float, seeds: int) -> Mean:
     samples = seeds if quantity in SHARES_OF_RUNS else samples
     unit = {"share": 1.0, "percent": 100.0}.get(kind_of(file, quantity), 0.0)
-    if any(fnmatchcase(quantity, pattern) for pattern in PARTS):
+    if quantity.startswith("predicted_as_"):
         unit = samples / seeds
     return Mean(value, half_width, quantity, int(samples), unit)

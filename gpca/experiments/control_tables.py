@@ -117,6 +117,7 @@ def table10_transfer(run: Run, intervals):
 
 STEPS = {PAPER: "paper's protocol", UNSEEN: "unseen objects", TRANSFER: "other sources", HARD: "hard"}
 SIDE = 0.08  # between the marks of two explainers
+LEAST_APART = 6.0  # between two numbers, so that both can be read
 LOOKS = {"rule": "black", "gpca": style.BLUE, "gpca_pair": style.GREEN, "pair_forest": style.VERMILION}
 
 
@@ -136,6 +137,7 @@ def loophole(run: Run, intervals) -> Figure:
     if not shown:
         raise InputError("intervals", "have no accuracy of these explainers", "run the controls first")
     drawing, [[panel]] = panels(1, 1, 2.7, style.COLUMN_WIDTH_IN)
+    ends: dict[str, float] = {}
     for k, name in enumerate(shown):
         by_table = rows_where(rows, method=name).set_index("table")
         there = [table for table in STEPS if table in by_table.index]
@@ -144,8 +146,11 @@ def loophole(run: Run, intervals) -> Figure:
         spread = np.maximum([values[:, 0] - values[:, 1], values[:, 2] - values[:, 0]], 0)  # but for rounding
         look = {"color": LOOKS[name], "marker": "o", "ms": 3.5, "lw": 1.2, "elinewidth": 0.8}
         panel.errorbar(across, values[:, 0], spread, label=explainers[name], **look)
-        beside = {"va": "center", "fontsize": SMALL_PT, "color": LOOKS[name]}
-        panel.text(len(STEPS) - 0.75, values[-1, 0], f"{values[-1, 0]:.0f}", **beside)
+        ends[name] = values[-1, 0]
+    height = 0.0
+    for name in sorted(ends, key=ends.__getitem__):
+        height = max(ends[name], height + LEAST_APART)
+        panel.text(len(STEPS) - 0.75, height, f"{ends[name]:.0f}", va="center", size=SMALL_PT, color=LOOKS[name])
     panel.axhline(100 / 3, color=style.GRAY, lw=0.8, ls=":")
     panel.set_xticks(range(len(STEPS)), STEPS.values())
     panel.set(xlim=(-0.45, len(STEPS) - 0.55), ylim=(0, 104), ylabel="accuracy (%)")
