@@ -100,7 +100,7 @@ def failures(run: Run, objects_files: Paths, causes_files: Paths, predictions_cs
     drawing = use_style().figure(figsize=size, layout="constrained")
     parts = drawing.subfigures(len(run.sources), 1, squeeze=False)[:, 0]
     for part, source, *files in zip(parts, run.sources, objects_files, causes_files, strict=True):
-        part.supylabel(run.source_titles[source])
+        part.supylabel(fill(run.source_titles[source], LETTERS // 2))
         objects, causes = ObjectClouds.load(files[0]), Causes.load(files[1])
         predictions = [path for path in predictions_csv if Path(path).parents[1].name == source]
         failed_S = (causes.registrations.split == "test") & (causes.truth.state == FAILED)

@@ -183,7 +183,8 @@ def short(table: Table) -> Table:
     heads = list(table.row_heads)
     shown = [place for place in range(len(heads)) if len({table.rows[row][place] for row in rows}) > 1]
     shown = [place for place in shown if heads[place] != SIGHT] or [len(heads) - 1]
-    main = sorted(_main(table), key=lambda key: key != score)[: MOST_COLUMNS - len(shown)]
+    filled = {key for row, key in table.cells if row in rows}
+    main = sorted(_main(table), key=lambda key: (key not in filled, key != score))[: MOST_COLUMNS - len(shown)]
     columns = {key: column for key, column in table.columns.items() if key in main or column.beside in main}
     order = {row: place for place, row in enumerate(rows)}
     cells = {(order[row], key): cell for (row, key), cell in table.cells.items() if row in order and key in columns}
