@@ -28,8 +28,11 @@ from gpca.settings import Distinct, PositiveShare
 NAME = "active_learning"
 PAPERS_HELD_OUT = "overlap"  # the paper's GPC knows noise and pose (Sec. IV-C)
 SETTINGS = {"pretrained": "all concepts", "unseen": "the known concepts only"}
-ROWS = {"pretrained": "encoder saw\nall concepts", "unseen": "encoder never saw\nthe new concept"}
-OVERLAP_ROWS = {**ROWS, "rare_5": "encoder saw all;\n5 % of the pool new"}
+ROWS = {
+    "pretrained": "encoder saw\nall concepts",
+    "unseen": "encoder never saw\nthe new concept",
+    "rare_5": "encoder saw all;\n5 % of the pool new",
+}
 
 
 def titles(names: Iterable[str] | None = None) -> dict[str, str]:
@@ -178,7 +181,6 @@ def _table(
     notes: Iterable[str],
     **compared: Any,
 ) -> Table:
-    """Table with a row for every combination of the titles of the axes; an oracle competes with none."""
     test, oracles = run.config["registrations"]["test"], [key for key, each in strategies().items() if each.oracle]
     rows = [replace(row, rival=row.where.get("method") not in oracles) for row in crossed(*axes.items())]
     metrics = metrics.assign(setting=metrics["table"].str.removeprefix(TABLE))
@@ -192,30 +194,29 @@ def _table(
     SECTION,
     "Learning curves",
     """Accuracy over the number of labels, by strategy: the mean over the concepts, each held out in turn, and over the
-    seeds. The paper's two strategies are thick and have 95 % intervals over the seeds.""",
-    needs=("further_concept",),
+    seeds. The paper's two strategies are thick, with 95 % intervals. Last row: its classifier, few new in the pool.""",
     **CURVES,
 )
 def active_learning_curves(run: Run, curve_files: Paths) -> Figure:
-    return _draw(run, curve_files, ROWS)
+    return _draw(run, curve_files)
 
 
 @figure(
     SECTION,
     "Learning curves, overlap held out",
-    """The curves behind Table III: the paper's experiment alone, in which overlap is the new concept. The last row
-    shows the paper's classifier and a pool in which the concept is rare.""",
+    "The paper's experiment alone, where other concepts are held out, too.",
+    needs=("further_concept",),
     **CURVES,
 )
 def active_learning_overlap(run: Run, curve_files: Paths) -> Figure:
-    return _draw(run, curve_files, OVERLAP_ROWS, (PAPERS_HELD_OUT,))
+    return _draw(run, curve_files, (PAPERS_HELD_OUT,))
 
 
-def _draw(run: Run, files: Paths, rows: Mapping[str, str], held_out: Collection[str] | None = None) -> Figure:
+def _draw(run: Run, files: Paths, held_out: Collection[str] | None = None) -> Figure:
     lines, target = titles(run.config["active_learning"]["strategies"]), run.config["active_learning"]["target"]
     by_strategy = mean_curves(files, held_out).items()
     curves = {(source, setting, strategy): curve for (source, strategy, setting), curve in by_strategy}
-    return draw_curves(curves, run.source_titles, rows, lines, STYLES, target)
+    return draw_curves(curves, run.source_titles, ROWS, lines, STYLES, target)
 
 
 @table(

@@ -184,7 +184,6 @@ Answers = dict[str, tuple[np.ndarray, str]]  # title -> scores (4,) of the label
 
 
 def _answers(causes: Causes, row: int, files: Paths, explainers: Mapping[str, str]) -> Answers:
-    """What each explainer that names something says of a sample."""
     registrations, truth = causes.registrations, causes.truth
     right = {concept: "tie" for concept, tied in zip(CONCEPTS, truth.tied[row], strict=True) if tied}
     right[truth.dominant[row]] = "right"
