@@ -75,10 +75,10 @@ class BatchedICP:
         self._iterations = settings.max_iterations
         self._target = make_target(target, settings.correspondence_distance)
 
-    def register(self, source: np.ndarray, T_init_n: np.ndarray, max_iterations: int | None = None) -> Arrays:
+    def register(self, source: np.ndarray, T_target_source_n: np.ndarray, max_iterations: int | None = None) -> Arrays:
         """Align `source` (N, 3) from poses (n, 4, 4): poses, fitness, inlier RMSE (n,); 0 iterations only measure."""
         require_cloud("source cloud", source)
-        poses_n = np.array(T_init_n, np.float64)
+        poses_n = np.array(T_target_source_n, np.float64)
         fitness_n, rmse_n = np.empty(len(poses_n)), np.empty(len(poses_n))
         source = np.ascontiguousarray(source, np.float64)
         iterations = self._iterations if max_iterations is None else max_iterations
@@ -86,15 +86,15 @@ class BatchedICP:
         return poses_n, fitness_n, rmse_n
 
 
-def pulls(target: Target, source: np.ndarray, poses_n: np.ndarray) -> Arrays:
+def pulls(target: Target, source: np.ndarray, T_target_source_n: np.ndarray) -> Arrays:
     """Return the mean of [y × r, r] (n, 6) over correspondences of `source` (N, 3), fitness (n,) and RMSE (n,).
 
     r = y - q is the offset of the moved point y from its neighbor q, and the mean half the gradient of that of |r|².
     """
-    n = len(poses_n)
+    n = len(T_target_source_n)
     pulls_n_6, fitness_n, rmse_n = np.empty((n, 6)), np.empty(n), np.empty(n)
     source = np.ascontiguousarray(source, np.float64)
-    pull_all(source, target, np.ascontiguousarray(poses_n), pulls_n_6, fitness_n, rmse_n)
+    pull_all(source, target, np.ascontiguousarray(T_target_source_n), pulls_n_6, fitness_n, rmse_n)
     return pulls_n_6, fitness_n, rmse_n
 
 
@@ -111,12 +111,12 @@ class BatchedPlaneICP:
         self._normals = np.ascontiguousarray(target_normals[rows_P], np.float64)
         self.iterations = settings.max_iterations
 
-    def register(self, source: np.ndarray, T_init_n: np.ndarray, max_iterations: int | None = None) -> Arrays:
+    def register(self, source: np.ndarray, T_target_source_n: np.ndarray, max_iterations: int | None = None) -> Arrays:
         """Align `source` (N, 3) from n initial poses (n, 4, 4), as :meth:`BatchedICP.register`."""
         require_cloud("source cloud", source)
         normals = np.ascontiguousarray(estimate_normals(source)) if self._generalized else NO_NORMALS
         source = np.ascontiguousarray(source, np.float64)
-        poses_n = np.array(T_init_n, np.float64)
+        poses_n = np.array(T_target_source_n, np.float64)
         iterations = self.iterations if max_iterations is None else max_iterations
         return _descend(lambda rows_m: self.sums(source, poses_n[rows_m], normals), poses_n, iterations)
 
@@ -138,10 +138,12 @@ def icp_to(target: np.ndarray, settings: ICPSettings) -> AnyICP:
     return BatchedPlaneICP(target, None, settings)
 
 
-def register_each(icps: Sequence[BatchedPlaneICP], sources: Sequence[np.ndarray], T_init_n: np.ndarray) -> Arrays:
+def register_each(
+    icps: Sequence[BatchedPlaneICP], sources: Sequence[np.ndarray], T_target_source_n: np.ndarray
+) -> Arrays:
     """Align n sources, each (N, 3), to n targets from one pose each, in lockstep; see :meth:`BatchedICP.register`."""
     sources = [np.ascontiguousarray(source, np.float64) for source in sources]
-    poses_n = np.array(T_init_n, np.float64)
+    poses_n = np.array(T_target_source_n, np.float64)
 
     def sums(rows_m: np.ndarray) -> Arrays:
         each = [icps[row].sums(sources[row], poses_n[row : row + 1]) for row in rows_m]

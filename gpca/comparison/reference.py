@@ -23,10 +23,8 @@ NOT_COMPARED = (  # made from times, which differ from run to run
     *("timings.csv", "runtime.csv", "tables/table7_runtime.csv"),
     *("comparison.csv", "claims.csv", "tables/claims.csv"),
 )
-TIMES = "*seconds*"
 LARGEST_BYTES = 3 * 10**7  # of a file of means, ten times the largest
 REMEDY = "regenerate it"
-_COUNTS = "*labels* *epochs* *samples* *delay* *calls* *parameters* clusters predicted_as_*"
 KINDS = tuple(  # file, metric or column, kind of value; the first that fits
     (file, pattern, kind)
     for file, patterns, kind in (
@@ -34,7 +32,7 @@ KINDS = tuple(  # file, metric or column, kind of value; the first that fits
         ("*", "rotation_deg", "degrees"),
         ("*", "kl_* nne* nees* *nll* *elbo*", "nats"),
         ("tables/table12_*", "auroc_failed lead", "share"),
-        ("*", _COUNTS, "count"),
+        ("*", "*labels* *epochs* *samples* *delay* *calls* *parameters* clusters predicted_as_*", "count"),
         ("*recovery.csv", "episodes tries nominal", "count"),
         ("tables/table5_*", "*aurc augrc brier", "share"),
         ("tables/*", "ece* nominal_calibration", "share"),
@@ -186,7 +184,7 @@ def read_means(path: Path, samples_of_source: Mapping[str, int] = MappingProxyTy
             raise InputError(path, "has no mean at all", REMEDY)
     else:
         raise InputError(path, "is neither tidy metrics nor a table", REMEDY)
-    return {key: mean for key, mean in means.items() if not fnmatchcase(mean.quantity, TIMES)}
+    return {key: mean for key, mean in means.items() if "seconds" not in mean.quantity}
 
 
 @cache

@@ -115,7 +115,7 @@ class Guaranteed:
         states = " or ".join(IN_WORDS.get(state, state) for state in self.states)
         name, (answer, risk) = f"{self.level:.0%} set", self.alarm
         return [
-            f"{name:10}{states} ({self.level:.0%} of such sets contain the true state)",
+            f"{name:10}{states} (such a set holds the true state in {self.level:.0%} of cases)",
             f"alarm     {answer} ({risk})",
             f"guarantee both are calibrated {self.basis}",
         ]

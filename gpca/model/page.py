@@ -91,7 +91,7 @@ def promise(guarantee: Guaranteed | None) -> str:
     return section(
         "What is guaranteed",
         f'<ul class="chips" aria-label="Set of states">{chips}</ul>'
-        f"<p>The true state is one of those marked: {guarantee.level:.0%} of such sets contain it. It was calibrated "
+        f"<p>Such a set of marked states holds the true one in {guarantee.level:.0%} of cases. It was calibrated "
         f"{guarantee.basis}.</p>"
         f"<p>Failure alarm: {call}. {sentence(risk)}.</p>",
     )

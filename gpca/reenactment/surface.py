@@ -42,7 +42,7 @@ class ModelSurface:
         self.normals, self.tangents = axes[:, :, 0], np.swapaxes(axes[:, :, 1:], 1, 2)  # (M, 3) and (M, 2, 3)
         own = dots(self.points - self.centers, self.normals)
         left_out = dots(self.points - others, other_axes[:, :, 0])
-        # Variance of the distance of points from planes in which they had no part, beyond that of those that had.
+        # Variance of the distances to planes fitted without the point, beyond that to planes fitted with it.
         self.roughness = max(trimmed_square(left_out) - trimmed_square(own), 0.0)
 
     @cached_property
