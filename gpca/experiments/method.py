@@ -25,7 +25,6 @@ from gpca.reporting.figures.style import BLUE, CONCEPT_COLORS, GRAY, write_title
 EXPERIMENT = Experiment(name="method", beside=("pipeline",))
 SECTION = "IV-A Datasets and controlled perturbations"
 CONCEPT = "pose"  # of the sample that Fig. 2 shows, because before and after ICP differ to the eye
-CAPTIONS = {"init": "initial", "icp": "aligned"}
 CONCEPT_TITLES = {"noise": "Noise", "pose": "Pose error", "overlap": "Overlap"}
 NO_ACTION = "No action:\n$u$ is that of\na clean pair"
 THRESHOLD: dict[str, Any] = {"color": style.BLACK, "linestyle": (0, (3, 2)), "linewidth": 0.8}  # the look of its line
@@ -53,9 +52,9 @@ def fig2_overview(run: Run, registrations: Path, embeddings: Path, predictions: 
 
     seen = stages.seen(row)
     corners = np.concatenate([np.concatenate(pair) for pair in seen.values()])
-    for left_in, (which, pair) in zip((0.02, 1.42), seen.items(), strict=True):
+    for left_in, caption, (which, pair) in zip((0.02, 1.42), ("initial", "aligned"), seen.items(), strict=True):
         draw_clouds(canvas.panel(left_in, 1.78, 1.08, 0.92), *pair, 1.0, (corners.min(axis=0), corners.max(axis=0)))
-        canvas.text(left_in + 0.54, 1.74, f"{CAPTIONS[which]}: {stages.words(row, which)}", va="top")
+        canvas.text(left_in + 0.54, 1.74, f"{caption}: {stages.words(row, which)}", va="top")
     canvas.arrow((1.12, 2.24), (1.40, 2.24), words="ICP")
     canvas.arrow((2.52, 2.24), (2.96, 2.24), words=encoder_title(**run.config["embedding"]))
     stages_of.draw_embedding(canvas.panel(3.02, 1.86, 0.42, 0.76), stages.h_S_d[row])

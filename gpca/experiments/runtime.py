@@ -57,8 +57,9 @@ def table7_runtime(run: Run, runtime: Frame) -> Table:
     repeats, threads = (int(runtime[name].iloc[0]) for name in ("repeats", "threads"))
     titles = {"mean": "Mean", "deviation": "Std. dev.", "median": "Median", "published": "Paper"}
     look: dict[str, Any] = {"interval": False, "limits": (0, inf), "least_is_best": True}
+    model = title_of(run.sources.get(run.config["model"]["source"]) or frames_of(run.config))
     return sheet.build(
-        caption=f"Runtime per component on {model_title(run)}, and as the paper prints it",
+        caption=f"Runtime per component on {model}, and as the paper prints it",
         column_head="statistic",
         columns={
             name: Column(f"{title} (ms)", decimals=0 if name == "published" else 2, **look)
@@ -73,7 +74,3 @@ def table7_runtime(run: Run, runtime: Frame) -> Table:
             "`python -m gpca explain`. 512 points: the encoder sees all of them, in one draw.",
         ),
     )
-
-
-def model_title(run: Run) -> str:
-    return title_of(run.sources.get(run.config["model"]["source"]) or frames_of(run.config))

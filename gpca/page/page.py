@@ -32,7 +32,6 @@ GROUPS = {
     "Scans": ("table18_scan_causes", "scan_failures", "table17_scans", "table9_frames", "fig5_real_world_example"),
     "Repair and recovery": ("table20_repair", "table11_registration", "table8_recovery"),
 }
-REST = "Everything else"
 DOCS = "../../docs"  # from the folder of a run in a checkout, results/{run}
 FEWEST = 2  # mean number of rows with the same first label from which they form a group
 _CSS_PIXELS = 170 / 300  # CSS pixels of a figure's pixel at 300 dpi, so that its letters are as large as the text's
@@ -92,7 +91,7 @@ def write_page(folder: str | Path, run: FinishedRun) -> None:
         verdict_map=content.get(VERDICTS),
         paper=[content[name] for name in PAPER if name in content],
         groups={title: results for title, results in groups.items() if results},
-        rest=REST,
+        rest="Everything else",
         sections=sections,
         comparison=page_comparison(folder / "comparison.csv"),
         links=links,

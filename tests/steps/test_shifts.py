@@ -111,6 +111,11 @@ def test_both_tables_show_all_explainers_and_shifts(folder, monkeypatch):
     assert "| nothing |" in whole and "| its samples |" in whole
     titles = ("As learned, model moved", "Scaled", "Planes", "Mean over shifts")
     assert all(f"| {title} |" in by_shift for title in titles)
+    shown = experiment.table9_shifts(RUN, rows)
+    assert list(shown.columns) == ["samples", "lead", "reenact", "residuals", "most_frequent"]
+    tree = rows[rows["method"] == "residuals"].replace({"method": {"residuals": "tree_trivial"}})
+    better = pd.concat([rows, tree.assign(value=tree["value"] + 1)])
+    assert list(experiment.table9_shifts(RUN, better).columns)[3:] == ["residuals", "tree_trivial", "most_frequent"]
     monkeypatch.setattr(experiment, "PRODUCT", "scaled")  # what a user does comes first
     whole, by_shift = experiment.table9_shift(RUN, rows), experiment.table9_shifts(RUN, rows)
     assert list(whole.columns)[:2] == ["scaled", "standard"]

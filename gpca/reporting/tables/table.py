@@ -186,7 +186,9 @@ def short(table: Table) -> Table:
     filled = {key for row, key in table.cells if row in rows}
     main = sorted(_main(table), key=lambda key: (key not in filled, key != score))[: MOST_COLUMNS - len(shown)]
     columns = {key: column for key, column in table.columns.items() if key in main or column.beside in main}
-    order = {row: place for place, row in enumerate(rows)}
+    order, best = {row: place for place, row in enumerate(rows)}, table.best()
+    hidden = {(row, key) for row, key in best if row not in order or key not in columns}
+    groups = [group for group in table.compared if not hidden.intersection(group)]  # else the second best were bold
     cells = {(order[row], key): cell for (row, key), cell in table.cells.items() if row in order and key in columns}
     return replace(
         table,
@@ -194,7 +196,7 @@ def short(table: Table) -> Table:
         rows=tuple(tuple(table.rows[row][place] for place in shown) for row in rows),
         columns={key: columns[key] for key in (*main, *(key for key in columns if key not in main))},
         cells=cells,
-        compared=tuple([(order[row], key) for row, key in group if row in order] for group in table.compared),
+        compared=tuple([(order[row], key) for row, key in group if row in order] for group in groups),
     )
 
 

@@ -41,6 +41,17 @@ def test_readers_get_pooled_rows_the_best_first_and_the_trivial_ones_last(tmp_pa
         assert len(list(csv.reader(file))) == 1 + 12 * len(KEYS)
 
 
+def test_where_the_best_of_a_row_is_left_out_nothing_in_it_is_bold():
+    keys = [f"k{number}" for number in range(8)]
+    for best in ("k0", "k7"):
+        cells = {(0, key): Cell(2.0 if key == best else 1.0, 0.1, 3, 9) for key in keys}
+        columns, across = {key: Column(key) for key in keys}, [(0, key) for key in keys]
+        whole = Table("mine", "What", {"row": "Row"}, ((("a", "A"),),), "metric", columns, cells, compared=(across,))
+        part = short(whole)
+        assert list(part.columns) == keys[: MOST_COLUMNS - 1]
+        assert (whole.best(), part.best()) == ({(0, best)}, {(0, best)} & set(part.cells))
+
+
 def test_of_many_rows_those_of_datasets_the_rule_the_paper_and_plugins_stay(tmp_path, monkeypatch):
     methods = ["oracle", "gpca", *(f"net{k}" for k in range(20)), "rule"]
     part = short(large(methods, ("cups", "cans", "cars")))
