@@ -1,5 +1,6 @@
 """Diagnoses of parts of the test samples: by margin, number of causes, symmetry, error, state and what is shown."""
 
+from itertools import product
 from math import inf
 
 import numpy as np
@@ -13,10 +14,10 @@ from gpca.experiments import diagnosis
 from gpca.experiments.cause_tables import AGAIN, SECTION
 from gpca.reporting.sheet import Column, Row, Sheet, Show, plain_cell, plural, show, where
 
-DECISIONS = ("named_right", "regret")
+DECISIONS = {"named_right": ("right", 100.0), "regret": ("regret", inf)}  # in words, and the largest
 SMALL_MARGIN, LARGE_MARGIN = 0.01, 0.03  # diameters
 SMALL_ERROR, LARGE_ERROR = 0.05, 0.10
-SIMPLE = ("chance", "most_frequent", "rule", "reenact")  # explainers that are not trained
+SIMPLE = ("reenact", "rule", "most_frequent", "chance")  # explainers that are not trained
 PAPER = "gpca"  # GP-CA on the paper's input
 
 
@@ -89,14 +90,14 @@ def table9_strata(run: Run, strata):
     failed = where(strata, {"concept": "state_failed", "metric": "regret", "against": ""})
     regret = failed.set_index("method")["value"]
     trained = [name for name in explainers if name in regret.index and name not in (*SIMPLE, PAPER)]
-    names = [name for name in (*SIMPLE, PAPER) if name in explainers and name in regret.index]
-    names += sorted(trained, key=lambda name: regret[name])[:1]
+    best = sorted(trained, key=lambda name: regret[name])[:1]
+    ordered = (SIMPLE[0], *best, PAPER, *SIMPLE[1:])
+    names = [name for name in ordered if name in explainers and name in regret.index]
     chosen = {name: explainers[name] for name in names} | AGAIN
     columns: dict[str, Column] = {"samples": Column("n", decimals=0, interval=False, limits=(0.0, inf))}
-    for name, title in chosen.items():
-        right, regretted = ({"method": name, "metric": metric} for metric in DECISIONS)
-        columns[f"{name}_named_right"] = Show(f"{title}: right (%)", interval=name != CEILING, where=right)
-        columns[f"{name}_regret"] = Show(f"{title}: regret (%)", interval=False, limits=(0.0, inf), where=regretted)
+    for (metric, (words, most)), (name, title) in product(DECISIONS.items(), chosen.items()):
+        of, interval = {"method": name, "metric": metric}, metric == "named_right" and name != CEILING
+        columns[f"{name}_{metric}"] = Show(f"{title}: {words} (%)", interval=interval, limits=(0.0, most), where=of)
     rows = [
         Row([(kind, title), stratum], {"concept": f"{kind}_{stratum[0]}"})
         for kind, (title, strata_of_kind) in KINDS.items()

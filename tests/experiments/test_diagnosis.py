@@ -145,7 +145,7 @@ def test_strata_are_written_read_and_tabled(run, causes, tmp_path):
     assert {"margin", "causes"} <= set(right["concept"].str.split("_").str[0])
     table = table9_strata(RUN, strata)
     kinds = ("named_right", "regret")
-    assert list(table.columns)[1:] == [f"{name}_{kind}" for name in ("right", CEILING) for kind in kinds]
+    assert list(table.columns)[1:] == [f"{name}_{kind}" for kind in kinds for name in ("right", CEILING)]
     tested = causes.truth.state[causes.rows("test")]
     rows = {tuple(key for key, _ in labels): row for row, labels in enumerate(table.rows)}
     assert table.cells[rows["state", "nominal"], "samples"].mean == (tested == NOMINAL).sum()
