@@ -4,6 +4,7 @@ import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import compress
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +39,7 @@ from gpca.reenactment.settings import ReenactmentSettings
 from gpca.seeds import seed_of_file
 
 DESCRIBED = "descriptors"  # `reads` of explainers; all but these, `EMBEDDINGS` and `REENACTED` need nothing else
-FEWEST_LABELS = 2  # among the samples of scans that an explainer learns from
+FEWEST_LABELS = 2  # among the samples that an explainer learns from
 
 
 def diagnose(job: Job) -> None:
@@ -208,8 +209,13 @@ class World:
                 h_S_d, logits_S_C = embed(model, observed_only(self._registrations), *self._axes, self._encoder)
                 attached = {**self._registrations.attached, "embedding": h_S_d, "head_logits": logits_S_C}
                 asked.append(replace(self._registrations, attached=attached))
+            if learned:  # of a dataset whose families are all asked about, nothing is left to learn from
+                enough = [len(set(part.concept)) >= FEWEST_LABELS for part in learned]
+                learned, asked = list(compress(learned, enough)), list(compress(asked, enough))
         else:
             learned, asked = [Registrations.joined(learned)] if learned else [], [self._read(reads)]
+        if not asked:
+            raise InputError(name, "has nothing to learn from: all families are asked about", "raise causes.train")
         self._prepared[reads, learned_from] = list(zip(learned or asked, asked, strict=True))
         return self._prepared[reads, learned_from]
 

@@ -1,14 +1,19 @@
 """The steps of shifted truths, from the drawing of samples to the table."""
 
+from dataclasses import replace
+
+import numpy as np
 import pandas as pd
 import pytest
 
 from gpca.attribution.predictions import read_predictions
 from gpca.causes.dataset import Causes
+from gpca.errors import InputError
 from gpca.evaluation.measures import AGAINST, KEYS, NUMBERS
 from gpca.experiments import shifts as experiment
 from gpca.jobs.job import Job
 from gpca.reenactment.dataset import Reenactments
+from gpca.steps import diagnosis
 from gpca.steps import shifts as step
 from gpca.steps.diagnosis import training_rows
 from tests.conftest import FEW_CAUSES
@@ -88,6 +93,26 @@ def test_nothing_is_learned_from_families_that_are_asked_about(folder, causes):
         families[apart] = set(training.cluster)
     assert families[False] == set(both.cluster[training_rows(step.labeled(causes), "")]) and not families[True]
     assert not families[False] & set(every.cluster)
+
+
+def test_an_encoder_whose_families_are_all_asked_about_says_nothing(folder, causes, monkeypatch):
+    every = step.labeled(causes)
+    elsewhere = replace(every, cluster=np.char.add("other ", every.cluster))
+    monkeypatch.setattr(diagnosis, "with_what_it_reads", lambda _, reads, path: {"a": every, "b": elsewhere}[path])
+    monkeypatch.setattr("gpca.encoders.training.load_model", lambda weights, *_: weights)
+    monkeypatch.setattr("gpca.encoders.training.embed", lambda model, *_: (np.full((len(every), 1), model), None))
+    settings = {"encoder": {}, "descriptors": {}, "reenactment": {}}
+
+    def prepared(*names):
+        files = {"causes": [folder / "standard/causes/four/seed100.npz"] * len(names), "embeddings": list(names)}
+        files["encoders"] = [1.0 + place for place in range(len(names))]
+        job = Job(source="x", seed=100, settings=settings)
+        return step.World(job, files, every, 13, lambda reads: every, apart=True).prepare("gpca")
+
+    ((training, asked),) = prepared("a", "b")
+    assert set(training.cluster) <= set(elsewhere.cluster) and (asked.attached["embedding"] == 2).all()
+    with pytest.raises(InputError, match=r"gpca.*nothing to learn from"):
+        prepared("a")
 
 
 def test_measures_are_of_each_shift_and_of_their_mean(folder):
