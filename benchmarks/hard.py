@@ -81,7 +81,7 @@ def draw(objects_file: Path, seed: int, candidates: range, screened: bool) -> tu
         measured = measuring.counterfactuals(registrar, subject, axes, "starts")
         try:
             numbers_F = numbers_of(measuring.observed(registrar, subject, axes, most=1))
-            if screened and not any(matching.acceptances(numbers_F).values()):
+            if screened and not matching.acceptances(numbers_F).any():
                 continue
             if state_of(measuring.truth(measured, ENDS)) == FAILED:
                 truth = measuring.truth(measured)
@@ -127,7 +127,7 @@ def check(numbers_N_F: np.ndarray, cause_N: np.ndarray, object_N: np.ndarray, se
 
     random, matching = generator("matching", seed), Matching.load()
     drawn = zip(numbers_N_F, cause_N, strict=True)
-    acceptance_N = np.array([matching.acceptances(numbers_F)[cause] for numbers_F, cause in drawn])
+    acceptance_N = np.array([matching.acceptances(numbers_F)[CONCEPTS.index(cause)] for numbers_F, cause in drawn])
     accepted_N = random.random(len(cause_N)) < acceptance_N
     result = {"candidates": len(cause_N), "accepted": int(accepted_N.sum())}
     result |= {f"accepted_{cause}": round(acceptance_N[cause_N == cause].mean(), 3) for cause in CONCEPTS}

@@ -64,12 +64,12 @@ class Quotas:
         """Whether a candidate with these causes (3,) could be wanted, whatever comes of it."""
         return any(self.wants_state(state, applied) for state in (NOMINAL, BORDERLINE, GEOMETRY, FAILED))
 
-    def wants_state(self, state: str, applied: np.ndarray) -> bool:
-        """Whether a candidate in this state with these causes (3,), of which any may be dominant, could be wanted."""
+    def wants_state(self, state: str, applied: np.ndarray, accepted: np.ndarray | bool = True) -> bool:
+        """Whether a candidate in this state could be wanted: one of its causes (3,) that is accepted may dominate."""
         if state != FAILED:
             return self.wants((state, False))
         kinds = (False, True) if applied.sum() > 1 else (False,)
-        named = np.array(CONCEPTS)[applied].tolist()
+        named = np.array(CONCEPTS)[applied & accepted].tolist()
         return any(self.wants((concept, several)) for concept in named for several in kinds)
 
     def wants(self, group: Group) -> bool:
@@ -210,23 +210,25 @@ class _Drawing:
             return None, UNSEEN
         registrar = Registrar(draw_candidate(subject.surface, applied, settings, random), settings)
         measured = measuring.counterfactuals(registrar, subject, axes, "starts")
-        accepted = dict.fromkeys(CONCEPTS, 1.0)
+        accepted = np.ones(len(CONCEPTS), bool)
         try:
             if settings.matched:
-                accepted = Matching.load().acceptances(numbers_of(measuring.observed(registrar, subject, axes, most=1)))
-                if not any(accepted.values()):
+                numbers_10 = numbers_of(measuring.observed(registrar, subject, axes, most=1))
+                accepted = generator(*axes, "matched").random() < Matching.load().acceptances(numbers_10)
+                if not accepted.any():
                     return None, (f"{UNSEEN[0]}{GIVEN_AWAY}", False)
             state = state_of(measuring.truth(measured, ENDS))
-            if not quotas.wants_state(state, applied):
+            if not quotas.wants_state(state, applied, accepted):
                 return None, (state, False)
             truth = measuring.truth(measured)
             group = group_of(truth)
             if not quotas.wants(group):
                 return None, group
-            if group[0] in CONCEPTS and truth.margin[0] < settings.limits.margin:
-                return None, (f"{group[0]}{TIED}", group[1])
-            if generator(*axes, "matched").random() >= accepted.get(group[0], 1.0):
-                return None, (f"{group[0]}{GIVEN_AWAY}", group[1])
+            if group[0] in CONCEPTS:
+                if truth.margin[0] < settings.limits.margin:
+                    return None, (f"{group[0]}{TIED}", group[1])
+                if not accepted[CONCEPTS.index(group[0])]:
+                    return None, (f"{group[0]}{GIVEN_AWAY}", group[1])
             record = {**measuring.observed(registrar, subject, axes), "truth": truth}
             if split == "test":
                 record["again"] = measuring.truth(measuring.counterfactuals(registrar, subject, axes, "other starts"))
@@ -279,12 +281,12 @@ class Matching:
         z = np.clip((numbers_10 - self.center) / self.scale, -FARTHEST, FARTHEST)
         return np.concatenate([[1.0], z, *(z[i] * z[i:] for i in range(len(z)))])
 
-    def acceptances(self, numbers_10: np.ndarray) -> dict[str, float]:
-        """Return the probability by which a candidate is accepted, by the dominant cause that it may have."""
+    def acceptances(self, numbers_10: np.ndarray) -> np.ndarray:
+        """Return the probabilities (3,) by which a candidate is accepted, by the dominant cause that it may have."""
         term_T = self.expanded(numbers_10)
         logits = [fsum((weights_T * term_T).tolist()) for weights_T in self.weights]
         odds = [exp(logit - max(logits)) for logit in logits]  # nothing else depends on the processor
         probabilities = [round(each / fsum(odds), DIGITS) for each in odds]
         if (least := min(probabilities)) < LEAST:
-            return dict.fromkeys(CONCEPTS, 0.0)
-        return {cause: least / probability for cause, probability in zip(CONCEPTS, probabilities, strict=True)}
+            return np.zeros(len(CONCEPTS))
+        return least / np.array(probabilities)

@@ -160,6 +160,7 @@ def test_a_candidate_is_wanted_as_long_as_it_can_be():
     assert wanted.wants_state("failed", BOTH)
     fill(wanted, ("noise", False), ("noise", True), ("overlap", False))
     assert wanted.wants_state("failed", BOTH)  # by overlap among several
+    assert not wanted.wants_state("failed", BOTH, np.array([True, True, False]))  # which is not accepted
     assert not wanted.wants_state("failed", np.array([False, False, True]))  # it has but one cause
     fill(wanted, ("overlap", True))
     assert not wanted.wants_applied(BOTH)

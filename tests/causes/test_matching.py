@@ -40,7 +40,7 @@ def test_what_is_accepted_gives_nothing_away(tmp_path):
     matching = Matching.load(tmp_path / "matching.csv")
     numbers_N_F, cause_N = candidates(4000, random)
     drawn = zip(numbers_N_F, cause_N, strict=True)
-    acceptance_N = np.array([matching.acceptances(numbers_F)[cause] for numbers_F, cause in drawn])
+    acceptance_N = np.array([matching.acceptances(numbers_F)[CONCEPTS.index(cause)] for numbers_F, cause in drawn])
     accepted_N = random.random(len(cause_N)) < acceptance_N
     assert known(numbers_N_F, cause_N) > 0.6
     assert known(numbers_N_F[accepted_N], cause_N[accepted_N]) < 0.4
@@ -52,7 +52,7 @@ def test_what_is_accepted_gives_nothing_away(tmp_path):
 def test_candidates_that_give_their_cause_away_are_refused_and_counted(four, monkeypatch):
     class Never:
         def acceptances(self, numbers_10):
-            return {"noise": 1.0, "pose": 0.0, "overlap": 1.0}
+            return np.array([1.0, 0.0, 1.0])  # no pose
 
     monkeypatch.setattr(drawing.Matching, "load", classmethod(lambda cls: Never()))
     settings = CauseSettings(**FEW_CAUSES | {"matched": True, "candidates": 3})
@@ -67,7 +67,7 @@ def test_candidates_that_give_their_cause_away_are_refused_and_counted(four, mon
 
 
 def test_what_no_cause_would_let_pass_is_not_measured(four, monkeypatch):
-    monkeypatch.setattr(drawing.Matching, "acceptances", lambda self, numbers_10: dict.fromkeys(CONCEPTS, 0.0))
+    monkeypatch.setattr(drawing.Matching, "acceptances", lambda self, numbers_10: np.zeros(len(CONCEPTS)))
     monkeypatch.setattr(drawing.Measuring, "truth", None)
     made = drawing._Drawing(four, "four", 100, settings := CauseSettings(**FEW_CAUSES | {"matched": True}))
     assert not made.up_to(12, "train", drawing.Quotas(settings.train, settings))
