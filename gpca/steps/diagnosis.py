@@ -203,19 +203,20 @@ class World:
             rows = training_rows(registrations, path)
             learned.append(registrations.subset(rows[~np.isin(registrations.cluster[rows], self._left_out)]))
         if reads == EMBEDDINGS:
-            axes = [part.axes for part in learned] or [None] * len(self._files["encoders"])
-            for weights, trained_on in zip(self._files["encoders"], axes, strict=True):
-                model = load_model(weights, self._encoder, LABELS, trained_on)
+            weights = self._files["encoders"]
+            encoders = list(zip(weights, [part.axes for part in learned] or [None] * len(weights), strict=True))
+            if learned:  # of a dataset whose families are all asked about, nothing is left to learn from
+                enough = [len(set(part.concept)) >= FEWEST_LABELS for part in learned]
+                learned, encoders = list(compress(learned, enough)), list(compress(encoders, enough))
+            if not encoders:
+                raise InputError(name, "has nothing to learn from: all families are asked about", "raise causes.train")
+            for file, trained_on in encoders:
+                model = load_model(file, self._encoder, LABELS, trained_on)
                 h_S_d, logits_S_C = embed(model, observed_only(self._registrations), *self._axes, self._encoder)
                 attached = {**self._registrations.attached, "embedding": h_S_d, "head_logits": logits_S_C}
                 asked.append(replace(self._registrations, attached=attached))
-            if learned:  # of a dataset whose families are all asked about, nothing is left to learn from
-                enough = [len(set(part.concept)) >= FEWEST_LABELS for part in learned]
-                learned, asked = list(compress(learned, enough)), list(compress(asked, enough))
         else:
             learned, asked = [Registrations.joined(learned)] if learned else [], [self._read(reads)]
-        if not asked:
-            raise InputError(name, "has nothing to learn from: all families are asked about", "raise causes.train")
         self._prepared[reads, learned_from] = list(zip(learned or asked, asked, strict=True))
         return self._prepared[reads, learned_from]
 
