@@ -147,12 +147,13 @@ def passage_of(definition: str | dict, folder: Path) -> str:
 
 
 def sentence(definition: dict, folder: Path) -> str:
-    """Return the first of the `cases` that holds, perhaps about the best of some rows."""
-    texts, most = dict[str, str](), -math.inf
+    """Return the first of the `cases` that holds, with its `words` put in, perhaps about the best of some rows."""
+    texts, most = dict(definition.get("words", {})), -math.inf
     for row, title in definition.get("best", {}).items():
         rows, column = _matching([*shlex.split(definition["of"]), f"explainer={row}"], folder)
         if rows and (number := float(rows[0][column])) > most:
-            most, texts = number, {"BEST": row, "TITLE": title, "Title": title[0].upper() + title[1:]}
+            most = number
+            texts |= {"BEST": row, "TITLE": title, "Title": title[0].upper() + title[1:]}
     for case in definition["cases"]:
         *comparisons, text = [_with(each, texts) for each in (*case.get("if", []), case["text"])]
         if all(holds(comparison, folder) for comparison in comparisons):

@@ -115,10 +115,11 @@ def test_a_sentence_stands_on_comparisons_with_the_reference(reference, comparis
 def test_a_sentence_is_about_the_best_row_and_is_chosen_by_the_numbers(reference, mine, said):
     (reference / "tables/own.csv").write_text(f"{TABLE}mine,own,{mine},8\n")
     cases = [
-        {"if": ["own BEST above max own gpca|forest"], "text": "- Title is best: [[own BEST .1f]]."},
+        {"if": ["own BEST above max own RIVALS"], "text": "- Title is best: [[own BEST .1f]]."},
         {"text": "- Title is best, not mine."},
     ]
-    lead = {"of": "own", "best": {"own": "mine", "forest": "a forest", "lacking": "none"}, "cases": cases}
+    best = {"own": "mine", "forest": "a forest", "lacking": "none"}
+    lead = {"of": "own", "words": {"RIVALS": "gpca|forest"}, "best": best, "cases": cases}
     text, _ = fill.filled("<!--begin lead-->\n<!--end lead-->\n", {"lead": lead}, "page.md", reference)
     assert text == f"<!--begin lead-->\n\n{said}\n\n<!--end lead-->\n"
 
