@@ -15,7 +15,7 @@ from gpca.process.processor import prepare
 COMMANDS = {  # those for a registration of one's own first, then those for a run
     "explain": "say whether a registration succeeded and, if not, why and what to do",
     "repair": "put a registration right if it is wrong, and say how sure that is",
-    "calibrate": "set what a model promises on registrations that you have labeled right or wrong",
+    "calibrate": "calibrate a model's guarantees on registrations that you have labeled right or wrong",
     "label": "ask a person for the labels that help the classifier most",
     "bench": "run a method of your own on a track, and show its row among the published ones",
     "score": "score predictions made anywhere, and show their row among the published ones",

@@ -1,4 +1,4 @@
-"""Command ``calibrate``: a model whose alarm and sets keep their promises on a user's own registrations."""
+"""Command ``calibrate``: calibrates the alarm and the state sets of a model on a user's own registrations."""
 
 import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
@@ -28,13 +28,15 @@ def _risk(text: str) -> float:
 
 def add_calibrate_arguments(parser: ArgumentParser) -> None:
     add = parser.add_argument
-    columns = "source, target and label: right, wrong, or in place of wrong its cause: noise, pose, overlap or several"
-    add("pairs", type=Path, help=f"CSV as for 'gpca explain --pairs', with the columns {columns}; perhaps group")
+    label = "label (right, or wrong, or instead of wrong the cause: noise, pose, overlap or several)"
+    columns = f"the columns source, target and {label}, and optionally group"
+    add("pairs", type=Path, help=f"CSV as for 'gpca explain --pairs', with {columns}")
     add("--out", required=True, type=Path, metavar="FILE", help="model file to write")
-    add("--tolerance", default="3%", help="how far a right pose is off at most: 5mm, 2deg or 3%% (default)")
-    add("--risk", type=_risk, default=0.05, help="largest share of wrong calls, of good and of failed (default 0.05)")
+    add("--tolerance", default="3%", help="largest error of a right pose: 5mm, 2deg or 3%% (default)")
+    risk = "largest share of failed registrations called good, and of good ones called failed (default 0.05)"
+    add("--risk", type=_risk, default=0.05, help=risk)
     add("--unit", choices=METERS_PER_UNIT, default="m", help="unit of files and poses (default m)")
-    add("--source-unit", choices=METERS_PER_UNIT, help="unit of the sources, if another one")
+    add("--source-unit", choices=METERS_PER_UNIT, help="unit of the sources, if it differs")
     add("--model", type=Path, help="model to start from (default: that of 'gpca explain')")
     add("--method", help="registration method, such as gicp (default: the model's ICP)")
 
@@ -45,11 +47,13 @@ def run_calibrate(options: Namespace) -> None:
     rows = from_rows(options, (*COLUMNS, "label"))
     files = [options.pairs.parent / name for _, row in rows for key in FILES if (name := row.get(key))]
     require_apart(options, ["out"], [path, *files])
-    labels, groups = ([(row.get(name) or "").strip() for _, row in rows] for name in ("label", "group"))
+    labels = [(row["label"] or "").strip() for _, row in rows]
+    groups = [(row.get("group") or "").strip() for _, row in rows]
+    given_groups = groups if any(groups) else None
     from gpca.model.calibration import LabeledRegistrations, require_labels
 
     names = [place for place, _ in rows]
-    require_labels(labels, groups if any(groups) else None, names)  # before anything is registered
+    require_labels(labels, given_groups, names)  # before anything is registered
     inputs = []
     for place, row in rows:
         try:
@@ -63,7 +67,9 @@ def run_calibrate(options: Namespace) -> None:
     from gpca.model.result import Tolerance
     from gpca.process.progress import progress
 
-    tolerance, explainer, diagnoses = Tolerance.parse(options.tolerance), Explainer(Model.load(path)), []
+    tolerance = Tolerance.parse(options.tolerance)
+    explainer = Explainer(Model.load(path))
+    diagnoses = []
     read_target = target_reader(False)
     for place, each in zip(names, progress(inputs, "explaining", unit=" pairs"), strict=True):
         try:
@@ -72,7 +78,7 @@ def run_calibrate(options: Namespace) -> None:
         except InputError as fault:
             raise InputError(place, str(fault)) from fault
         diagnoses.append(explanation.diagnosis)
-    labeled = LabeledRegistrations.of(diagnoses, labels, groups if any(groups) else None, names, options.risk)
+    labeled = LabeledRegistrations.of(diagnoses, labels, given_groups, names, options.risk)
     model = replace(explainer.model, diagnoser=labeled.set_in(explainer.model.diagnoser))
     model.save(options.out)
     for line in labeled.report():

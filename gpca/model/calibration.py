@@ -106,8 +106,8 @@ class LabeledRegistrations:
         yield f"labeled   {right} right and {wrong} wrong{groups}, within {ends} % of the diameter{left_out}"
         yield self._promise("missed", f"at most {self.risk:.0%} of failures are called good", 1 - self.risk, WRONG)
         yield self._promise("alarms", f"at most {self.risk:.0%} of good ones are called failed", 1 - self.risk, RIGHT)
-        what = "the state" if self._named else "right or wrong, as not every wrong one has its cause"
-        yield self._promise("sets", f"{LEVEL:.0%} of the sets hold {what}", LEVEL, "")
+        what = "the true state" if self._named else "right or wrong, whichever is true (some wrong ones lack a cause)"
+        yield self._promise("sets", f"at least {LEVEL:.0%} of the sets contain {what}", LEVEL, "")
 
     @property
     def _named(self) -> bool:  # whether each wrong registration has its cause
@@ -129,5 +129,5 @@ class LabeledRegistrations:
         more = ceil(level / (1 - level) - ROUNDING) - count
         if more <= 0:
             return f"{name:10}promised: {words}"
-        what = f"{among} ones".strip() if self.group_N is None else f"groups{f' with {among} ones' if among else ''}"
-        return f"{name:10}not yet: {words} takes {more} more {what}"
+        what = f"{among} registrations".strip() if self.group_N is None else f"groups{among and f' with {among} ones'}"
+        return f"{name:10}not yet: {words}; label {more} more {what}"

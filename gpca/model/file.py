@@ -72,7 +72,7 @@ class Model:
         learned = f"the diagnosis learned from {objects}; GP-CA as in the paper from {paper}"
         by = [level.guarantee for level in self.diagnoser.levels if level.guarantee and level.guarantee.labeled]
         counts = " and ".join(dict.fromkeys(f"{guarantee.samples}" for guarantee in by))
-        return f"{learned}; limits are set on {counts} labeled registrations" if by else learned
+        return f"{learned}; calibrated on {counts} labeled registrations" if by else learned
 
     def save(self, path: str | Path) -> None:
         """Write the file; equal models give equal bytes."""

@@ -58,9 +58,9 @@ def test_what_is_missing_is_counted_for_each_risk():
         [replace(FAILED, result=0.1 * number) for number in range(7)], causes, list("aabbcde")
     ).report()
     assert head.startswith("labeled   5 right and 2 wrong in 5 groups")
-    assert missed == "missed    not yet: at most 5% of failures are called good takes 17 more groups with wrong ones"
-    assert alarms == "alarms    not yet: at most 5% of good ones are called failed takes 14 more groups with right ones"
-    assert sets == "sets      not yet: 90% of the sets hold the state takes 4 more groups"
+    assert missed == "missed    not yet: at most 5% of failures are called good; label 17 more groups with wrong ones"
+    assert alarms.endswith(": at most 5% of good ones are called failed; label 14 more groups with right ones")
+    assert sets == "sets      not yet: at least 90% of the sets contain the true state; label 4 more groups"
     [level] = labeled(10).levels()
     assert set(level.guarantee.alarm(np.array([0.0, 0.5, 1.0]))) == {"not sure"}
 
@@ -84,7 +84,7 @@ def test_only_what_a_user_labeled_is_promised_at_the_tolerances_of_the_labels(mo
     replace(model, diagnoser=named).save(tmp_path / "mine.pt")
     read = Model.load(tmp_path / "mine.pt")
     assert read.diagnoser.levels == named.levels
-    assert read.learning.endswith("; limits are set on 60 labeled registrations")
+    assert read.learning.endswith("; calibrated on 60 labeled registrations")
     assert Diagnoser.from_state(model.diagnoser.state()).levels[0].guarantee.labeled is False
 
 

@@ -272,7 +272,7 @@ def test_limits_are_set_on_labeled_pairs_and_a_pose_of_a_row_is_judged_as_it_is(
     assert main([*words, "--out", "mine.pt"]) == 0
     out, err = capsys.readouterr()
     assert out.startswith("labeled   2 right and 2 wrong in 2 groups, within 3 % of the diameter\nmissed    not yet: ")
-    assert err.endswith("limits are set on 4 labeled registrations\n")
+    assert err.endswith("calibrated on 4 labeled registrations\n")
     assert main(["explain", "--pairs", "pairs.csv", "--model", "mine.pt", "--unit", "mm", "--json-lines"]) == 0
     lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert [line["method"] == "given" for line in lines] == [False, True] * 2
