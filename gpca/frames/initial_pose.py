@@ -183,17 +183,17 @@ class GlobalRegistration:
             registration.CorrespondenceCheckerBasedOnNormal(np.deg2rad(60)),
         ]
         tree, model_m, normals = cKDTree(source.points), np.asarray(model.points), np.asarray(model.normals)
+        to_points = registration.TransformationEstimationPointToPoint()
+        to_planes = registration.TransformationEstimationPointToPlane()
+        last_sample = registration.RANSACConvergenceCriteria(4000, 0.999)
+        last_step = registration.ICPConvergenceCriteria(max_iteration=20)
         best, best_share = np.eye(4), -1.0
         for number in range(self._settings.tries):
             o3d.utility.random.seed((seed + number) % 2**31)
             coarse = registration.registration_ransac_based_on_feature_matching(
-                *(source, model, source_features, model_features, False, reach_m),
-                *(registration.TransformationEstimationPointToPoint(), 3, checkers),
-                registration.RANSACConvergenceCriteria(4000, 0.999),
+                source, model, source_features, model_features, False, reach_m, to_points, 3, checkers, last_sample
             )
-            to_planes = registration.TransformationEstimationPointToPlane()
-            stop = registration.ICPConvergenceCriteria(max_iteration=20)
-            fine = registration.registration_icp(source, model, reach_m, coarse.transformation, to_planes, stop)
+            fine = registration.registration_icp(source, model, reach_m, coarse.transformation, to_planes, last_step)
             T_camera_object = inverse(np.array(fine.transformation))
             seen_m = transform(T_camera_object, model_m)
             facing = np.sum(seen_m * rotate(T_camera_object, normals), axis=1) < 0
