@@ -195,7 +195,8 @@ def _answers(causes: Causes, row: int, files: Paths, explainers: Mapping[str, st
         prediction = rows[chosen].iloc[0]
         if not prediction["abstained"]:
             scores_4 = prediction[[f"score_{label}" for label in LABELS]].to_numpy(float)
-            answers[title] = scores_4, right.get(prediction["concept_predicted"], "wrong")
+            words = title if list(explainers.values()).count(title) == 1 else f"{title} ({name})"
+            answers[words] = scores_4, right.get(prediction["concept_predicted"], "wrong")
     return answers
 
 

@@ -104,4 +104,6 @@ def test_the_example_names_its_dataset_and_who_is_right(causes, run, tmp_path):
     words, row = words_of(figure), cause_figures.usual_failure(causes, truth, cause_figures.is_clear(causes))
     assert words[0].startswith(f"Four: {causes.registrations.object_name[row].partition('_')[2].replace('_', ' ')}.")
     phi_3 = np.maximum(causes.truth.phi[row], 0)
+    alike = cause_figures._answers(causes, row, predictions, dict.fromkeys(("right", "always_pose"), "Same"))
+    assert list(alike) == ["Same (right)", "Same (always_pose)"]
     assert {"without causes", "Right", "right", *(f"{share:.2f}" for share in phi_3 / phi_3.sum())} <= set(words)
