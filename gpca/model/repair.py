@@ -14,17 +14,8 @@ from gpca.alignment.methods.registry import make_method
 from gpca.causes.settings import MODEL, Moved
 from gpca.model.result import Calibrated, Evidence, ResultJudge
 from gpca.pairs.distances import ObservedPair
+from gpca.reenactment import hypotheses
 from gpca.reenactment.enactment import Stayed
-from gpca.reenactment.hypotheses import (
-    FEWEST_INLIERS,
-    LAST_ITERATIONS,
-    SAME,
-    distinct_rows,
-    find_hypotheses,
-    fits_at,
-    search_starts,
-    weights_of,
-)
 from gpca.reenactment.mixture import Mixture, densities_of
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
@@ -74,7 +65,7 @@ def propose(
     possible = np.flatnonzero(weight_K > 0)
     possible = possible[np.argsort(-weight_K[possible], kind="stable")]
     T_k = refine(observed, T_K[possible])
-    rows = distinct_rows(surface, T_k, len(T_k), SAME / 2)
+    rows = hypotheses.distinct_rows(surface, T_k, len(T_k), hypotheses.SAME / 2)
     apart_k_n = np.stack([surface.apart(T_k @ inverse(T_k[row])) for row in rows], axis=1)
     weight_n = np.bincount(apart_k_n.argmin(axis=1), weight_K[possible], minlength=len(rows))
     T_n = np.concatenate([T_registered[None], T_k[rows]])
@@ -115,7 +106,8 @@ def best_end(observed: np.ndarray, surface: ModelSurface) -> np.ndarray:
         T_n, fitness_n, rmse_n = BatchedICP(model, icp).register(points, starts_n)
         return T_n[np.argsort(clipped_cost(fitness_n, rmse_n, icp.correspondence_distance), kind="stable")]
 
-    return ends(points, surface.points, ends(some, some_model, search_starts(some, some_model))[:CONTINUED])[0]
+    swept_n = ends(some, some_model, hypotheses.search_starts(some, some_model))
+    return ends(points, surface.points, swept_n[:CONTINUED])[0]
 
 
 def unrefined(observed: np.ndarray, T_k: np.ndarray) -> np.ndarray:
@@ -128,8 +120,8 @@ def by_mixture(model: np.ndarray, spacing: float) -> Refine:
 
     def refine(observed: np.ndarray, T_k: np.ndarray) -> np.ndarray:
         densities = densities_of(observed, model)
-        width_k = mixture.fit(observed, T_k, LAST_ITERATIONS, moving=False, densities=densities).width_n
-        return mixture.fit(observed, T_k, LAST_ITERATIONS, width_n=width_k, densities=densities).T_n
+        width_k = mixture.fit(observed, T_k, hypotheses.LAST_ITERATIONS, moving=False, densities=densities).width_n
+        return mixture.fit(observed, T_k, hypotheses.LAST_ITERATIONS, width_n=width_k, densities=densities).T_n
 
     return refine
 
@@ -155,8 +147,8 @@ def measured(observed: np.ndarray, model: np.ndarray, icp: ICPSettings, moved: M
 def search(pair: ObservedPair, settings: ReenactmentSettings, surface: ModelSurface) -> tuple[np.ndarray, np.ndarray]:
     """Return the hypotheses (K, 4, 4) of a pair's true pose, as a re-enactment has them, and their weights."""
     before, T_runs_n = transform(pair.T_init, pair.observed), pair.T_runs @ inverse(pair.T_init)
-    hypotheses = find_hypotheses(before, surface, T_runs_n, settings, generator(*pair.axes, "hypotheses"))
-    return np.array([hypothesis.T for hypothesis in hypotheses]), weights_of(hypotheses)
+    candidates = hypotheses.find_hypotheses(before, surface, T_runs_n, settings, generator(*pair.axes, "hypotheses"))
+    return np.array([hypothesis.T for hypothesis in candidates]), hypotheses.weights_of(candidates)
 
 
 def decide(
@@ -205,8 +197,8 @@ def verdict_of(
 
 def inliers(points: np.ndarray, surface: ModelSurface, T_K: np.ndarray) -> np.ndarray:
     """Return which points (K, N) lie on the surface at poses (K, 4, 4); all, where next to none would be left."""
-    inlier_K_N = fits_at(T_K, points, surface).inlier_n_N > 0.5
-    return inlier_K_N | (inlier_K_N.sum(axis=1) < FEWEST_INLIERS)[:, None]
+    inlier_K_N = hypotheses.fits_at(T_K, points, surface).inlier_n_N > 0.5
+    return inlier_K_N | (inlier_K_N.sum(axis=1) < hypotheses.FEWEST_INLIERS)[:, None]
 
 
 @dataclass(frozen=True)

@@ -5,20 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from gpca.active_learning import settings as learning
 from gpca.active_learning.acquisition import STREAMS, strategies
 from gpca.active_learning.curves import POOL_COLUMNS, STREAM_COLUMNS, write_curves
 from gpca.active_learning.retraining import Retraining, learn
 from gpca.active_learning.rounds import initial_gpc, make_task, rounds
-from gpca.active_learning.settings import (
-    ALL_LABELS,
-    PAIR,
-    ActiveLearningSettings,
-    FrameLabelSettings,
-    RareSettings,
-    RetrainingSettings,
-    StreamSettings,
-    rare_setting,
-)
 from gpca.active_learning.stream import run_stream
 from gpca.encoders.registry import EncoderSettings
 from gpca.errors import require_known
@@ -60,8 +51,9 @@ def learn_actively(job: Job) -> None:
         require_known("strategy", strategy, (*strategies(), *STREAMS))
     inputs = [job.registrations, job.embeddings, job.embeddings_without]
     with record_provenance(job.out, inputs, job.settings, seed=job.seed):
-        settings = ActiveLearningSettings.from_dict(job.settings)
-        stream, held_out = StreamSettings(**job.settings.get("stream", {})), job.settings.get("held_out", CONCEPTS)
+        settings = learning.ActiveLearningSettings.from_dict(job.settings)
+        stream = learning.StreamSettings(**job.settings.get("stream", {}))
+        held_out = job.settings.get("held_out", CONCEPTS)
         curves: dict[str, dict] = {strategy: {} for strategy in job.strategies}
         loaded = Registrations.load(job.registrations, job.axes)
         registrations = replace(loaded, attached=read_embedding(job.embeddings, loaded))
@@ -78,9 +70,9 @@ def learn_actively(job: Job) -> None:
                     curves[strategy][setting, concept] = [step for step, _ in rounds(*given, *job.axes, setting)]
                 elif setting == "pretrained":
                     curves[strategy][setting, concept] = run_stream(*given, stream, *job.axes)
-        rare = read_settings(RareSettings, job.settings["rare"])
+        rare = read_settings(learning.RareSettings, job.settings["rare"])
         for share in rare.shares if NEW in held_out else ():
-            setting = rare_setting(share)
+            setting = learning.rare_setting(share)
             task = make_task(registrations, NEW, settings, *job.axes, new_share=share)
             retraining = Retraining(task, rare.gpc, *job.axes, setting)
             compared = (*COMPARED, REDUNDANT) if share == rare.shares[0] else COMPARED
@@ -95,18 +87,18 @@ def learn_actively(job: Job) -> None:
 def learn_on_frames(job: Job) -> None:
     """Learn each new concept on depth frames, from the embeddings of backbones and from the pair."""
     with record_provenance(job.out, [job.registrations, *job.embeddings], job.settings, seed=job.seed):
-        settings = read_settings(FrameLabelSettings, job.section("frame_labels"))
+        settings = read_settings(learning.FrameLabelSettings, job.section("frame_labels"))
         # Rounds as those of a concept that is rare on whole objects, with the budget of frames.
-        rare = fields_of(job.section("active_learning")["rare"], RetrainingSettings)
-        budget = read_settings(RetrainingSettings, rare | {"labels": settings.labels, "least": settings.least})
-        start = ActiveLearningSettings(initial=settings.initial)
+        rare = fields_of(job.section("active_learning")["rare"], learning.RetrainingSettings)
+        budget = read_settings(learning.RetrainingSettings, rare | {"labels": settings.labels, "least": settings.least})
+        start = learning.ActiveLearningSettings(initial=settings.initial)
         curves: dict[str, dict] = {strategy: {} for strategy in job.strategies}
         for name, samples in progress(_embedded(job, settings.points), f"labels of {job.source}"):
             for concept in settings.held_out:
                 task = make_task(samples, concept, start, *job.axes, new_share=settings.share)
                 retraining = Retraining(task, budget.gpc, *job.axes, name)
                 for strategy in job.strategies:
-                    if strategy == ALL_LABELS:  # before any label, and after those of the whole pool
+                    if strategy == learning.ALL_LABELS:  # before any label, and after those of the whole pool
                         queries: list[list[int]] = [[], list(range(len(task.pool)))]
                         curve = [retraining.look(retraining.fit(queried, None), queried) for queried in queries]
                     else:
@@ -127,4 +119,4 @@ def _embedded(job: Job, points: int) -> Iterator[tuple[str, Registrations]]:
     yield from zip(job.backbones, map(samples, of_backbones), strict=True)
     measured_S_F = describe_registrations(registrations, *job.axes, points=points)["relations"]
     normalized = NormalizedFeatures(*job.axes, "frame_labels").fit(measured_S_F[registrations.rows("train")])
-    yield PAIR, samples(normalized(measured_S_F))
+    yield learning.PAIR, samples(normalized(measured_S_F))

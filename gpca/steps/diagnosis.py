@@ -19,15 +19,7 @@ from gpca.causes.truth import BORDERLINE
 from gpca.classifier.scores import Attribution
 from gpca.encoders.registry import EncoderSettings
 from gpca.errors import InputError
-from gpca.explainers.interface import (
-    BARE,
-    EMBEDDINGS,
-    REENACTED,
-    ConceptExplainer,
-    ExplainerEntry,
-    answer_of,
-    icp_calls,
-)
+from gpca.explainers import interface
 from gpca.explainers.registry import CAUSES, explainer_entry
 from gpca.io.csv_file import write_csv
 from gpca.io.frame import Frame
@@ -95,11 +87,14 @@ def diagnose_frames(job: Job) -> None:
 
 def learned_files(job: Job) -> dict[str, list[Path]]:
     """Return the files that explainers learn from, those of all sources of objects, by what explainers read of them."""
-    return {name: job.get(name, []) for name in ("causes", DESCRIBED, REENACTED, "encoders", EMBEDDINGS, "further")}
+    return {
+        name: job.get(name, [])
+        for name in ("causes", DESCRIBED, interface.REENACTED, "encoders", interface.EMBEDDINGS, "further")
+    }
 
 
 def explained(
-    entry: ExplainerEntry,
+    entry: interface.ExplainerEntry,
     settings: dict[str, Any],
     causes: Causes,
     path: Path,
@@ -121,14 +116,14 @@ def explained(
         learned.append(part.subset(training_rows(part, other)))
     fit(explainer, entry, learned, further, registrations.cluster[causes.rows("test")])
     starts = causes.T_target_source_runs.shape[1]
-    calls = icp_calls(entry.sees, starts, remedies, reenactment.calls(starts) if reenactment else 0)
-    answer = answer_of(explainer, observed_only(registrations), LABELS)
+    calls = interface.icp_calls(entry.sees, starts, remedies, reenactment.calls(starts) if reenactment else 0)
+    answer = interface.answer_of(explainer, observed_only(registrations), LABELS)
     return replace(answer, icp_calls_N=np.full(len(registrations), calls))
 
 
 def fit(
-    explainer: ConceptExplainer,
-    entry: ExplainerEntry,
+    explainer: interface.ConceptExplainer,
+    entry: interface.ExplainerEntry,
     learned: Sequence[Registrations],
     further: Iterable[Path],
     families: Sequence[str] | np.ndarray = (),
@@ -150,11 +145,11 @@ def training_rows(registrations: Registrations, path: Path) -> np.ndarray:
 
 def with_what_it_reads(registrations: Registrations, reads: str, path: Path | None) -> Registrations:
     """Attach what an explainer with these `reads` needs, from its file."""
-    if reads == BARE or path is None:
+    if reads == interface.BARE or path is None:
         return registrations
-    if reads == EMBEDDINGS:
+    if reads == interface.EMBEDDINGS:
         read = read_embedding(path, registrations, logits=True)
-    elif reads == REENACTED:
+    elif reads == interface.REENACTED:
         enacted = Reenactments.load(path, registrations)
         read = {"verdict": enacted.verdict, "reenactment": reenactment_features(enacted)}
         read |= {"result_error": enacted.result_error, "weight": enacted.weight}
@@ -185,7 +180,7 @@ class World:
         self._encoder = EncoderSettings(**job.section("encoder"))
         descriptors = DescriptorSettings(**job.section("descriptors"))
         calls = ReenactmentSettings(**job.section("reenactment")).calls(starts)
-        self._calls = partial(icp_calls, starts=starts, descriptors=descriptors, reenactment=calls)
+        self._calls = partial(interface.icp_calls, starts=starts, descriptors=descriptors, reenactment=calls)
         self._prepared: dict[tuple[str, str], list[tuple[Registrations, Registrations]]] = {}
 
     def prepare(self, name: str, learned_from: str = OBJECTS) -> list[tuple[Registrations, Registrations]]:
@@ -193,7 +188,7 @@ class World:
         from gpca.encoders.training import embed, load_model
 
         reads = explainer_entry(name, CAUSES).reads
-        reads = reads if reads in (EMBEDDINGS, REENACTED) else DESCRIBED
+        reads = reads if reads in (interface.EMBEDDINGS, interface.REENACTED) else DESCRIBED
         if (reads, learned_from) in self._prepared:
             return self._prepared[reads, learned_from]
         learned, asked = [], []
@@ -202,7 +197,7 @@ class World:
             registrations = with_what_it_reads(labeled(Causes.load(path)), reads, read)
             rows = training_rows(registrations, path)
             learned.append(registrations.subset(rows[~np.isin(registrations.cluster[rows], self._left_out)]))
-        if reads == EMBEDDINGS:
+        if reads == interface.EMBEDDINGS:
             weights = self._files["encoders"]
             encoders = list(zip(weights, [part.axes for part in learned] or [None] * len(weights), strict=True))
             if learned:  # of a dataset whose families are all asked about, nothing is left to learn from
@@ -247,7 +242,7 @@ class World:
                 explainer = entry.made(*self._axes, **settings)
                 others = (self._files["further"], self._left_out) if learned_from == OBJECTS else ((), ())
                 fit(explainer, entry, [learned], *others)
-                answer = answer_of(explainer, observed_only(asked.subset(rows)), LABELS)
+                answer = interface.answer_of(explainer, observed_only(asked.subset(rows)), LABELS)
                 scores_S_C[rows], abstained_S[rows] = answer.scores_N_C, answer.abstained_N
             all_scores.append(scores_S_C)
             all_abstained.append(abstained_S)
@@ -261,7 +256,7 @@ def frames_to_explain(job: Job, causes: Causes, enacted: Path | None, learned: d
     registrations = labeled(causes)
 
     def read(reads: str) -> Registrations:
-        if reads == REENACTED:
+        if reads == interface.REENACTED:
             return with_what_it_reads(registrations, reads, enacted)
         descriptors, icp = DescriptorSettings(**job.section("descriptors")), ICPSettings(**job.section("icp"))
         described, _, _ = describe_all(causes, job.source, job.seed, descriptors, icp)

@@ -34,24 +34,13 @@ from gpca.seeds import generator, seed_of
 from gpca.steps.registration_trials import timed
 from gpca.uncertainty import estimates
 from gpca.uncertainty.estimates import KINDS, EstimatorPairSettings, Kind
+from gpca.uncertainty.estimators import interface
 from gpca.uncertainty.estimators.analytic import sample
-from gpca.uncertainty.estimators.interface import (
-    POINT_TO_PLANE,
-    POINT_TO_POINT,
-    CovarianceEstimate,
-    Example,
-    FailedEstimate,
-    Moved,
-    RegisteredPair,
-    describe,
-    example,
-    true_twist,
-)
 from gpca.uncertainty.estimators.registry import estimator_entry, make_estimator
 from gpca.uncertainty.settings import start_deviation
 from gpca.uncertainty.spread import divergence
 
-MOVED: Moved = "model"  # onto the observed cloud, as the causes' track has it
+MOVED: interface.Moved = "model"  # onto the observed cloud, as the causes' track has it
 LEVEL = 0.95  # of the region whose coverage is counted
 Clouds = Iterator[tuple[np.ndarray, np.ndarray]]  # (N, 3) of sources and (P, 3) of targets
 SETTINGS = ICPSettings("point_to_point", REACH, ITERATIONS)  # to points and to planes
@@ -85,7 +74,9 @@ class Redraws:
             yield model[: self.points], transform(self.T_target_observed, observed)
 
 
-def draw_twists(kind: Kind, registered: RegisteredPair, redraws: Redraws, repeats: int, *axes: object) -> np.ndarray:
+def draw_twists(
+    kind: Kind, registered: interface.RegisteredPair, redraws: Redraws, repeats: int, *axes: object
+) -> np.ndarray:
     """Return the results of so many registrations as twists (n, 6) about the pose; FailedEstimate for too few."""
     if kind == "starts":
         return sample(registered, repeats, *axes)
@@ -99,13 +90,13 @@ def draw_twists(kind: Kind, registered: RegisteredPair, redraws: Redraws, repeat
 def _register_each(method: str, clouds: Clouds, starts_n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Poses of other clouds registered from each start (n, 4, 4), and which found a correspondence (n,)."""
     parts = []
-    if method == POINT_TO_PLANE:
+    if method == interface.POINT_TO_PLANE:
         for at in range(0, len(starts_n), AT_ONCE):
             starts_k = starts_n[at : at + AT_ONCE]
             pairs = list(islice(clouds, len(starts_k)))
             icps = [BatchedPlaneICP(target, estimate_normals(target), SETTINGS) for _, target in pairs]
             parts.append(register_each(icps, [source for source, _ in pairs], starts_k)[:2])
-    elif method == POINT_TO_POINT:
+    elif method == interface.POINT_TO_POINT:
         for start, (source, target) in zip(starts_n, clouds, strict=False):  # the clouds are without end
             parts.append(BatchedICP(target, SETTINGS).register(source, start[None])[:2])
     else:
@@ -122,7 +113,7 @@ class EstimatedRow:
     """A test registration by one method."""
 
     columns: dict[str, object]  # of every row about it: sample, object, method, errors
-    registered: RegisteredPair
+    registered: interface.RegisteredPair
     true_twist: np.ndarray  # (6,) of the true pose about that of the registration, the nearest of symmetric ones
     # By kind: twists (n, 6) of the results about the pose, none where too few runs found any correspondence; seconds
     references: Mapping[Kind, tuple[np.ndarray, float]]
@@ -161,24 +152,24 @@ class DrawnCauses:
             started = perf_counter()
             try:
                 twists_n_6 = draw_twists(kind, registered, redraws, settings.repeats, *self._axes(method), "reference")
-            except FailedEstimate:
+            except interface.FailedEstimate:
                 twists_n_6 = np.empty((0, 6))
             references[kind] = twists_n_6, perf_counter() - started
-        return EstimatedRow(columns, registered, true_twist(registered, T_true, judge, MOVED), references)
+        return EstimatedRow(columns, registered, interface.true_twist(registered, T_true, judge, MOVED), references)
 
-    def example(self, row: int, method: str, settings: EstimatorPairSettings) -> Example:
+    def example(self, row: int, method: str, settings: EstimatorPairSettings) -> interface.Example:
         """Return a training registration with results of a few registrations of other data from other starts."""
         registered, T_true, redraws = self._registered(row, method, settings)
         judge, runs = self.judges.of(self.causes.registrations, row), settings.train_starts
         draw = partial(draw_twists, "all", registered, redraws, runs, *self._axes(method), "examples")
-        return example(registered, T_true, judge, MOVED, draw, runs)
+        return interface.example(registered, T_true, judge, MOVED, draw, runs)
 
     def _axes(self, method: str) -> tuple:
         return self.source, self.seed, "estimators", method
 
     def _registered(
         self, row: int, method: str, settings: EstimatorPairSettings
-    ) -> tuple[RegisteredPair, np.ndarray, Redraws]:
+    ) -> tuple[interface.RegisteredPair, np.ndarray, Redraws]:
         """Register the model, the source, to the observed cloud, in the frame where the causes have put that.
 
         Return also the true pose, which takes what was observed there, and what draws the clouds again; InputError
@@ -192,7 +183,9 @@ class DrawnCauses:
         pair = Pair(source, target, inverse(observed.T_init), seed=seed_of(*observed.axes, "draws")).with_normals()
         outcome = make_method(method)(pair)
         deviation_6 = start_deviation(settings.start_rotation_deg, settings.start_translation)
-        registered = RegisteredPair(pair, outcome, method, deviation_6, lambda: describe(pair, outcome, MOVED))
+        registered = interface.RegisteredPair(
+            pair, outcome, method, deviation_6, lambda: interface.describe(pair, outcome, MOVED)
+        )
         T_icp, T_true = (registrations.T_target_source(which, row) for which in ("icp", "true"))
         T_true = T_icp @ inverse(T_true)
         candidate, surface = drawn_again(self.objects, self.causes, row, self.source, self.seed, self.drawn_by)
@@ -237,9 +230,9 @@ def try_estimators(
             cases.append(case)
             answers = {}
             for kind, (twists_n_6, seconds) in case.references.items():
-                answer = CovarianceEstimate(None, "too few of the reference's runs found a correspondence")
+                answer = interface.CovarianceEstimate(None, "too few of the reference's runs found a correspondence")
                 if len(twists_n_6):
-                    answer = CovarianceEstimate(np.cov(twists_n_6, rowvar=False), "")
+                    answer = interface.CovarianceEstimate(np.cov(twists_n_6, rowvar=False), "")
                 answers[f"reference_{kind}"] = answer, seconds
             answers |= {name: timed(estimate, case.registered) for name, estimate in trained.items()}
             for name, (answer, seconds) in answers.items():
@@ -252,7 +245,7 @@ def spaced(rows: np.ndarray, wanted: int) -> np.ndarray:
     return rows[np.unique(np.linspace(0, len(rows) - 1, min(wanted, len(rows))).round().astype(int))]
 
 
-def judged(case: EstimatedRow, answer: CovarianceEstimate, floor: float) -> dict[str, object]:
+def judged(case: EstimatedRow, answer: interface.CovarianceEstimate, floor: float) -> dict[str, object]:
     """Row of an estimate; numbers that it lacks are NaN."""
     numbers = dict.fromkeys(estimates.JUDGED, np.nan)
     if (sigma_6_6 := answer.covariance_6_6) is not None:

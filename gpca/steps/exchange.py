@@ -31,16 +31,8 @@ from gpca.seeds import generator, seed_of
 from gpca.settings import Bounds, Count, Distinct, fields_of, read_settings
 from gpca.steps.registration_trials import outcomes_by
 from gpca.uncertainty.designs import ADDITIVE_KNOBS, RegisteredRow
+from gpca.uncertainty.estimators import interface
 from gpca.uncertainty.estimators.analytic import sample
-from gpca.uncertainty.estimators.interface import (
-    POINT_TO_POINT,
-    CovarianceEstimate,
-    Example,
-    Moved,
-    RegisteredPair,
-    describe,
-    example,
-)
 from gpca.uncertainty.estimators.registry import make_estimator
 from gpca.uncertainty.interventions import UNTOUCHED, KnobbedSource, Knobs
 from gpca.uncertainty.settings import UncertaintySettings
@@ -52,7 +44,7 @@ LABELS = ("exchanged", "learnt_from", "asked_of", "explainer")  # columns before
 FAILURE = "failure"  # the column behind them: why the method failed, or the estimator
 TOO_FEW = "too few training registrations have an estimate"
 DESIGN = "additive"  # the design whose conditions are estimated
-MOVED: Moved = "observed"  # onto the model, as the paper's protocol has it
+MOVED: interface.Moved = "observed"  # onto the model, as the paper's protocol has it
 OBSERVED = (UNTOUCHED,)  # the condition of explainers that read the observed pair alone
 
 
@@ -230,9 +222,9 @@ class KnobbedRegistrar:
 
     def __init__(self, registrations: Registrations, source: str, seed: int, settings: UncertaintySettings) -> None:
         self._registrations, self._axes, self._settings = registrations, (source, seed, "uncertainty"), settings
-        self._register = make_method(POINT_TO_POINT)
+        self._register = make_method(interface.POINT_TO_POINT)
 
-    def under(self, row: int, settings_of_knobs: Sequence[Knobs]) -> Iterator[RegisteredPair]:
+    def under(self, row: int, settings_of_knobs: Sequence[Knobs]) -> Iterator[interface.RegisteredPair]:
         """Yield the registration of a row under each setting."""
         registrations, settings = self._registrations, self._settings
         axes = (*self._axes, registrations.split[row], registrations.sample[row])
@@ -244,10 +236,10 @@ class KnobbedRegistrar:
             pair = Pair(source.at(knobs), target, T_init, None, normals, seed_of(*axes, "estimates"))
             outcome = self._register(pair)
             deviation_6 = knobs.spread * settings.deviation_6()
-            described = cache(lambda pair=pair, outcome=outcome: describe(pair, outcome, MOVED))
-            yield RegisteredPair(pair, outcome, POINT_TO_POINT, deviation_6, described)
+            described = cache(lambda pair=pair, outcome=outcome: interface.describe(pair, outcome, MOVED))
+            yield interface.RegisteredPair(pair, outcome, interface.POINT_TO_POINT, deviation_6, described)
 
-    def examples(self, rows: np.ndarray, judges: Judges) -> list[Example]:
+    def examples(self, rows: np.ndarray, judges: Judges) -> list[interface.Example]:
         """Return rows as estimators learn from them."""
         examples = []
         for row in rows:
@@ -255,13 +247,13 @@ class KnobbedRegistrar:
             T_true = self._registrations.T_target_source("true", row)
             starts, judge = self._settings.starts, judges.of(self._registrations, row)
             draw = partial(sample, registered, starts, *self._axes, "examples")
-            examples.append(example(registered, T_true, judge, MOVED, draw, starts))
+            examples.append(interface.example(registered, T_true, judge, MOVED, draw, starts))
         return examples
 
     def estimates(
         self,
         rows: np.ndarray,
-        estimators: Mapping[str, Callable[[RegisteredPair], CovarianceEstimate]],
+        estimators: Mapping[str, Callable[[interface.RegisteredPair], interface.CovarianceEstimate]],
         settings_of_knobs: Sequence[Knobs] = ADDITIVE_KNOBS,
     ) -> dict[str, Estimates]:
         """Return the covariances of the rows under each setting, by estimator."""

@@ -49,7 +49,7 @@ def test_a_wrong_pose_is_replaced_by_one_that_is_called_good(wrong, monkeypatch)
     assert again.verdict == GOOD
     np.testing.assert_array_equal(again.T_target_source, repair.T_target_source)
     assert repair.wrong is None and "guarantee none" in repair.text()
-    monkeypatch.setattr("gpca.model.repair.find_hypotheses", None)  # those of the diagnosis are taken
+    monkeypatch.setattr("gpca.model.repair.hypotheses.find_hypotheses", None)  # those of the diagnosis are taken
     explanation = explainer.judge(*pair, T, repair=True)
     assert explanation.action == TAKE
     np.testing.assert_array_equal(explanation.repaired.T_target_source, repair.T_target_source)

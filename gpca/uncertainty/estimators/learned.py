@@ -6,14 +6,7 @@ import numpy as np
 
 from gpca.rigid import adjoint, exp, log
 from gpca.seeds import generator
-from gpca.uncertainty.estimators.interface import (
-    Estimator,
-    EstimatorEntry,
-    Example,
-    FailedEstimate,
-    RegisteredPair,
-    intrinsic_frame,
-)
+from gpca.uncertainty.estimators import interface
 
 FEWEST_EXAMPLES = 8
 FLOOR = 1e-8  # squared radians and diameters, of a training variance
@@ -23,8 +16,8 @@ SMALLEST_LOG, LARGEST_LOG = -16.0, 2.0  # of a variance, in squared radians or d
 
 
 def learn_cello(
-    examples: Sequence[Example], components: int = 8, steps: int = 100, learning_rate: float = 0.05
-) -> Estimator:
+    examples: Sequence[interface.Example], components: int = 8, steps: int = 100, learning_rate: float = 0.05
+) -> interface.Estimator:
     """Learn a metric of descriptors that finds similar training pairs (CELLO-3D, Landry et al., ICRA 2019).
 
     The covariance is the mean of the training pairs' ones with weights exp(-|L (φ - φ')|²), L diagonal, such that the
@@ -56,11 +49,11 @@ def learn_cello(
     scale_K = np.exp(log_scale.detach().numpy())
     known_E_K = features_E_K * scale_K
 
-    def estimate(registered: RegisteredPair) -> np.ndarray:
+    def estimate(registered: interface.RegisteredPair) -> np.ndarray:
         squares_E = np.square(reduce(described(registered)[None]) * scale_K - known_E_K).sum(axis=1)
         weights_E = np.exp(squares_E.min() - squares_E)
         variances_6 = (weights_E[:, None] * variances_E_6).sum(axis=0) / weights_E.sum()
-        return along_axes(np.diag(variances_6), intrinsic_frame(registered.pair.target))
+        return along_axes(np.diag(variances_6), interface.intrinsic_frame(registered.pair.target))
 
     return estimate
 
@@ -86,19 +79,19 @@ class Reduction:
         return np.clip((descriptors_n_F - self._mean_F) / self._deviation_F, -5, 5)
 
 
-def _reduced(examples: Sequence[Example], components: int) -> tuple[Reduction, np.ndarray]:
+def _reduced(examples: Sequence[interface.Example], components: int) -> tuple[Reduction, np.ndarray]:
     """Return the reduction that the examples give, and their components (E, K); too few examples are a failure."""
     if len(examples) < FEWEST_EXAMPLES:
-        raise FailedEstimate(f"{len(examples)} registrations to learn from, not {FEWEST_EXAMPLES}")
+        raise interface.FailedEstimate(f"{len(examples)} registrations to learn from, not {FEWEST_EXAMPLES}")
     descriptors_E_F = np.array([example.descriptors for example in examples])
     reduce = Reduction(descriptors_E_F, components)
     return reduce, reduce(descriptors_E_F)
 
 
-def described(registered: RegisteredPair) -> np.ndarray:
+def described(registered: interface.RegisteredPair) -> np.ndarray:
     """Return the pair's descriptors (F,); without any the estimate fails."""
     if registered.describe is None:
-        raise FailedEstimate("the pair has no descriptors")
+        raise interface.FailedEstimate("the pair has no descriptors")
     return registered.describe()
 
 
@@ -114,13 +107,13 @@ def twists_along_axes(twists_n_6: np.ndarray, T_target_intrinsic: np.ndarray) ->
 
 
 def learn_ensemble(
-    examples: Sequence[Example],
+    examples: Sequence[interface.Example],
     members: int = 5,
     hidden: int = 32,
     steps: int = 200,
     learning_rate: float = 0.01,
     weight_decay: float = 1e-3,
-) -> Estimator:
+) -> interface.Estimator:
     """Train networks on errors of training registrations against true poses (after De Maio & Lacroix, ICRA 2022).
 
     Each gives means and variances of the error along the target's principal axes from a pair's descriptors, by the
@@ -149,12 +142,12 @@ def learn_ensemble(
         loss.backward()
         optimizer.step()
 
-    def estimate(registered: RegisteredPair) -> np.ndarray:
+    def estimate(registered: interface.RegisteredPair) -> np.ndarray:
         with torch.no_grad():
             means, log_variances = _predicted(layers, torch.from_numpy(reduce(described(registered)[None])))
         aleatoric_6 = torch.exp(log_variances)[:, 0].mean(dim=0).numpy()
         epistemic_6 = means[:, 0].var(dim=0, correction=0).numpy()
-        return along_axes(np.diag(aleatoric_6 + epistemic_6), intrinsic_frame(registered.pair.target))
+        return along_axes(np.diag(aleatoric_6 + epistemic_6), interface.intrinsic_frame(registered.pair.target))
 
     return estimate
 
@@ -172,13 +165,13 @@ def _predicted(layers: Sequence, features_E_K):
     return 0.1 * outputs[:, :, :6], (2 * outputs[:, :, 6:] - 6).clamp(SMALLEST_LOG, LARGEST_LOG)
 
 
-def _errors(example: Example) -> np.ndarray:
+def _errors(example: interface.Example) -> np.ndarray:
     """Return the twists (n, 6) of the true pose about each of the runs' results, along the axes."""
     away_n = exp(example.true_twist[None]) @ np.linalg.inv(exp(example.twists))
     return twists_along_axes(log(away_n), example.T_target_intrinsic)
 
 
 ESTIMATORS = {
-    "cello": EstimatorEntry("CELLO-3D", "starts and data", learn=learn_cello),
-    "learned": EstimatorEntry("Learned ensemble", "error", learn=learn_ensemble),
+    "cello": interface.EstimatorEntry("CELLO-3D", "starts and data", learn=learn_cello),
+    "learned": interface.EstimatorEntry("Learned ensemble", "error", learn=learn_ensemble),
 }
