@@ -106,15 +106,13 @@ def table9_causes(run: Run, intervals):
 
 
 def lead(intervals: Frame, titles: Mapping[str, str]) -> str:
-    """Sentence on the lead over all sources together, with titles of explainers; empty where no rows have it.
-
-    Each dominant cause has a third of the failures.
-    """
+    """Sentence on the lead over all sources together, with titles of explainers; empty where no rows have it."""
     rows = rows_where(intervals, method=JUDGED, source=POOLED).set_index(["against", "metric"], drop=False)
     if (TRAINED, "balanced_accuracy") not in rows.index:
         return ""
     nominal, failed = rows.loc[""].loc[["false_alarm_rate", "dominant_accuracy"], "samples"]
-    row, fewest = rows.loc[(TRAINED, "balanced_accuracy")], int(min(nominal, failed // len(CONCEPTS)))
+    fewest = int(min(nominal, failed // len(CONCEPTS)))  # each dominant cause has a third of the failures
+    row = rows.loc[(TRAINED, "balanced_accuracy")]
     if fewest < FEWEST_FAILURES or row["clusters"] < FEWEST_CLUSTERS:
         counted = f"{fewest} samples of a kind and {row['clusters']:.0f} families"
         return f"Too little to conclude who leads: {counted} (it takes {FEWEST_FAILURES} and {FEWEST_CLUSTERS})."

@@ -150,10 +150,7 @@ DIAGNOSES = "diagnoses/{source}/{cause_explainer}/seed{seed}.csv"
     "causes.csv", "cause_intervals.csv", rule="cause_metrics", prediction_files=DIAGNOSES, causes_files=CAUSES_FILES
 )
 def collect(run: Run, prediction_files: Paths, causes_files: Paths) -> tuple[Frame, Frame]:
-    """Confusions and measures of all test samples by seed, and the measures over all seeds with intervals.
-
-    Borderline samples are in no confusion.
-    """
+    """Confusions of all but borderline test samples and measures by seed; the measures of all seeds, with intervals."""
     judged, records = with_pooled(read_judged(prediction_files, causes_files)), []
     for (source, explainer, seed), samples in judged.items():
         values = {metric: value_1[0] for metric, value_1 in measure(samples, np.ones((1, len(samples)))).items()}

@@ -165,10 +165,7 @@ def of_state(rows: Frame) -> dict[str, np.ndarray]:
 
 
 def measure(rows: Frame, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
-    """Metrics (B,) of registrations by their weights (B, N), as results/README.md lists them; NaN where undefined.
-
-    spearman_error is unweighted.
-    """
+    """Metrics (B,) of results/README.md by weights (B, N), NaN where undefined; spearman_error is unweighted."""
     from scipy.stats import chi2, spearmanr
 
     has_N = (rows["failure"] == "").to_numpy()

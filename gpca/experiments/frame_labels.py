@@ -24,15 +24,12 @@ def in_percent(target: float) -> str:
 
 
 def check(config: dict, left_out: LeftOut) -> None:
-    """Check the backbones, that the targets differ in percent, and that the labels at the start leave a pool.
-
-    A third of the training samples is of each concept.
-    """
+    """Check the backbones, that the targets differ in percent, and that the labels at the start leave a pool."""
     section, train = config["frame_labels"], config["real_world"]["train"]
     require_names("frame_labels.backbones", section["backbones"], config["encoders"], "encoder", left_out("encoders"))
     if len(set(map(in_percent, section["targets"]))) < len(section["targets"]):
         raise InputError("config key frame_labels.targets", "two are equal in whole percent", "remove one")
-    if (initial := section["initial"]) // 2 >= train // len(CONCEPTS):
+    if (initial := section["initial"]) // 2 >= train // len(CONCEPTS):  # a third of the samples is of each concept
         fault = f"{initial} labeled samples of two concepts leave none of {train} training samples for the pool"
         raise InputError("config key frame_labels.initial", fault, "lower it or raise real_world.train")
 

@@ -119,7 +119,9 @@ def collect(run: Run, prediction_files: Paths, set_files: Paths) -> tuple[Frame,
             by_seed += [(TABLE + name, source, learner, metric, ALL, seed, float(v)) for metric, v in values.items()]
     for (source, learner), parts in answers.items():
         for name, subset in predicted.sets_of(pd.concat(parts, ignore_index=True)).items():
-            samples = Clustered.drawn(subset["seed"], clusters_of(subset), "learner intervals", source, name)
+            # A family is another cluster than that of the same name in the set of the other source.
+            clusters = list(subset["cluster"].where(subset["set"] != "source", "other/" + subset["cluster"]))
+            samples = Clustered.drawn(subset["seed"], clusters, "learner intervals", source, name)
             score_S, wrong_S = subset["max_score"].to_numpy(float), predicted.wrong(subset)
             correlation = partial(_of_rows, diagnostics.rank_correlation, score_S, subset[DISTANCES[0]].to_numpy(float))
             estimates = {RHO: samples.over_seeds(correlation, (-1, 1))}
@@ -159,11 +161,6 @@ def probability_metrics(rows: Frame) -> dict[str, float]:
     }
     areas = product(predicted.scores_of(rows), AREAS.items())
     return values | {f"{area}_{score}": of(-rows[score].to_numpy(), wrong_S) for score, (area, of) in areas}
-
-
-def clusters_of(rows: Frame) -> list[str]:
-    """Cluster of each sample: its family, apart from that of the same name in the set of the other source."""
-    return list(rows["cluster"].where(rows["set"] != "source", "other/" + rows["cluster"]))
 
 
 SECTION = "IV-D Ablation studies"

@@ -26,7 +26,7 @@ from gpca.recovery.actions import ACTIONS, action_of
 from gpca.recovery.policies import PolicyEntry, named_policies, policies, policy_entry, policy_module
 from gpca.recovery.settings import LoopSettings
 from gpca.reporting.sheet import Row, Sheet, Table, over_clusters, plain_cell, plural, show, where
-from gpca.settings import Bounds, Count, Distinct, Keys, NotNegative, OpenShare, Share, changes_of, part_of
+from gpca.settings import Bounds, Count, Distinct, Keys, NotNegative, OpenShare, Share, changes_of, part_of, required
 
 SECTION = "V Robotic deployment for action recovery"
 DECLARED = ("uncertain", "dominant", "improvement")  # thresholds of the config; null leaves one to the calibration
@@ -42,13 +42,6 @@ class DeclaredThresholds:
     queued_share: Annotated[float, Bounds(minimum=0, exclusiveMaximum=1)]
     dominant: Share
     improvement: Share
-
-
-@dataclass(frozen=True)
-class FalseAlarms:
-    """How many of the good registrations gated policies may act on."""
-
-    false_alarms: OpenShare
 
 
 @dataclass(frozen=True)
@@ -69,7 +62,7 @@ class Section:
     costs: dict[str, Share]
     needless: Share
     thresholds: DeclaredThresholds
-    gate: FalseAlarms
+    gate: Annotated[dict, required(false_alarms=OpenShare)]  # share of the good that gated policies act on
     rehearsals: Count
     loop: Annotated[dict, part_of(LoopSettings, without=("success", "cloud_points", "icp"))]
     train: TrainSamples

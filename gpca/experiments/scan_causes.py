@@ -1,7 +1,4 @@
-"""Causes of failed registrations of scans to scans, and which explainers name them (Table XVIII).
-
-The tables and the figure stand in :mod:`gpca.experiments.scan_failures`.
-"""
+"""Causes of failed registrations of scans to scans, and which explainers name them (Table XVIII)."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field

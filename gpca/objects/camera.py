@@ -103,10 +103,7 @@ def planes(corners_F_3_3: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 @dataclass(frozen=True)
 class DepthNoise:
-    """Noise of a structured-light depth camera, by Nguyen, Izadi and Lovell (3DIMPVT 2012).
-
-    Lateral noise shifts the pixel that is looked at, so that edges fray.
-    """
+    """Noise of a structured-light camera (Nguyen et al., 3DIMPVT 2012); lateral noise shifts pixels, so edges fray."""
 
     scale: Annotated[float, Bounds(minimum=0, maximum=10)] = 1.0  # factor of both; 0 is a perfect sensor
     grazing_deg: Annotated[float, Bounds(exclusiveMinimum=0, maximum=90)] = 80.0  # steepest that is measured

@@ -22,7 +22,10 @@ def page_comparison(path: str | Path) -> dict | None:
     """
     if not Path(path).is_file():
         return None
-    rows = _rows(path)
+    rows = []
+    for number, row in enumerate(read_csv(path, COMPARISON_COLUMNS).to_dict("records"), 2):
+        with refusing(f"{path}, line {number}", "holds no numbers of a comparison ({})", "regenerate it"):
+            rows.append(_printed(row))
     tables = []
     for name in dict.fromkeys(row["table"] for row in rows):
         table_rows = [row for row in rows if row["table"] == name]
@@ -41,16 +44,8 @@ def page_comparison(path: str | Path) -> dict | None:
     }
 
 
-def _rows(path: str | Path) -> list[dict[str, str]]:
-    """Return the entries as printed; texts stay as they are."""
-    rows = []
-    for number, row in enumerate(read_csv(path, COMPARISON_COLUMNS).to_dict("records"), 2):
-        with refusing(f"{path}, line {number}", "holds no numbers of a comparison ({})", "regenerate it"):
-            rows.append(_printed(row))
-    return rows
-
-
 def _printed(row: Mapping[str, str]) -> dict[str, str]:
+    """Return the entries of a row as printed; texts stay as they are."""
     printed = {}
     for name in _NUMBERS:  # numbers in round tens have -1 decimals
         text, decimals = row[name], max(0, int(row["decimals"]))

@@ -54,10 +54,6 @@ class PrintedNumber(NamedTuple):
     high: float
     decimals: int
 
-    def is_apart(self, other: PrintedNumber) -> bool:
-        """Return whether both have intervals, which do not overlap."""
-        return self.high < other.low or other.high < self.low
-
 
 def read_printed_table(path: Path) -> PrintedTable:
     """Read the Markdown that :meth:`gpca.reporting.tables.table.Table.write` wrote; an InputError for another file."""
@@ -77,10 +73,7 @@ def read_printed_table(path: Path) -> PrintedTable:
 
 
 def read_number(text: str) -> PrintedNumber | None:
-    """Return the number at the start of a cell, ``97.7 ± 0.4`` or ``97.7 (96.9 to 98.2)``; None where there is none.
-
-    A bound, as in ``> 52.0``, counts as its value.
-    """
+    """Return the number at the start of a cell, ``97.7 ± 0.4``, ``97.7 (96.9 to 98.2)`` or ``> 52.0``, if any."""
     match = _NUMBER.match(text)
     if match is None:
         return None
@@ -139,7 +132,7 @@ def _cell(one: str, other: str) -> dict[str, str]:
     if first is None or second is None:
         return {"one": one, "other": other, "difference": "", "kind": DIFFERENT if one and other else ALONE}
     difference = f"{second.value - first.value:+z.{max(first.decimals, second.decimals)}f}"
-    kind = APART if first.is_apart(second) else DIFFERENT
+    kind = APART if first.high < second.low or second.high < first.low else DIFFERENT  # where both have intervals
     return {"one": one, "other": other, "difference": difference, "kind": kind}
 
 

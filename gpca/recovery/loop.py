@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from functools import cache, partial
+from functools import cache
 from time import perf_counter
 
 import numpy as np
@@ -17,7 +17,7 @@ from gpca.recovery.actions import Action, Holding, Robot
 from gpca.recovery.answers import Answer, Answers, Explain
 from gpca.recovery.chances import FailureGate, Trial, alarm_threshold, learn_gate
 from gpca.recovery.episodes import Episode
-from gpca.recovery.policies import Case, Means, Order, PolicyEntry, best_order, policy_entry
+from gpca.recovery.policies import Case, Means, PolicyEntry, policy_entry
 from gpca.recovery.reenactment import Belief, CauseEffects, KnownModel, believe, reenact
 from gpca.recovery.settings import LoopSettings
 from gpca.reenactment.settings import ReenactmentSettings
@@ -66,13 +66,6 @@ def rehearse(
         right = episode.solved_by(sequence, actions, settings)
         trials[episode.number].append(Trial(state(episode, sequence[:-1]), sequence[-1], right))
     return Rehearsal(episodes, trials, {e.number: answers.history(explainer, e.number, ())[0].bald for e in episodes})
-
-
-def rehearsed_order(
-    failures: Sequence[Episode], actions: Mapping[str, Action], costs: Mapping[str, float], settings: LoopSettings
-) -> Order:
-    solved = [partial(episode.solved_by, by_name=actions, settings=settings) for episode in failures]
-    return best_order(tuple(actions), costs, solved, settings.budget)
 
 
 def rehearsed_gate(episodes: Mapping[str, Sequence[Episode]], false_alarms: float) -> FailureGate:

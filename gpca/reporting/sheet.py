@@ -1,7 +1,4 @@
-"""Tables as rows × columns of selections: each says which rows of the measured numbers its cells show.
-
-Experiments import from here what tables are made of.
-"""
+"""Tables as rows × columns of selections of the measured numbers, and what else experiments make tables of."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace

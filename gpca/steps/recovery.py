@@ -4,6 +4,7 @@ import json
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,6 @@ from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.objects.camera import MeshScene, shade
 from gpca.objects.source import data_files, resolve, surfaces
-from gpca.objects.surface import Surface
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.synthesis import as_registrations
@@ -33,7 +33,7 @@ from gpca.recovery.actions import FEWEST_POINTS, Action, Robot, action_of, look_
 from gpca.recovery.answers import learn_explainers
 from gpca.recovery.chances import learn_utility
 from gpca.recovery.episodes import Attempt, Episode, find_episodes, register_first
-from gpca.recovery.policies import Means, policy_entry
+from gpca.recovery.policies import Means, best_order, policy_entry
 from gpca.recovery.settings import LoopSettings, RecoverySettings
 from gpca.rigid import inverse
 from gpca.seeds import generator
@@ -55,7 +55,9 @@ def run(job: Job) -> None:
     outputs = [job.rows, job.timings, job.policy, job.example]
     axes = (SOURCE, job.seed)
     with record_provenance(outputs, data_files(objects), job.settings, seed=job.seed):
-        tables = lay_tables(surfaces(objects, job.downloads), settings, *axes)
+        models = [simplified(surface) for surface in surfaces(objects, job.downloads)]
+        shelf = Shelf(models, SOURCE, recovery["model_points"], InitialPoseSettings(**recovery["estimator"]))
+        tables = {part: Situations(shelf, settings.situation, (*axes, part)) for part in PARTS}
         registered = register_situations(tables, recovery["train"], recovery["calibration"], loop)
         names = [name for name in dict.fromkeys(entry.explainer for entry in entries) if name]
         explain = learn_explainers(names, as_samples(registered), settings, *axes)
@@ -71,8 +73,8 @@ def run(job: Job) -> None:
             utility = learn_utility(rehearsal.trials.values(), costs, tuple(actions), recovery["needless"])
             means = replace(means, utility=utility)
         if any(entry.rehearsed for entry in entries):
-            failures = [episode for episode in rehearsed if episode.failed]
-            means = replace(means, order=closed_loop.rehearsed_order(failures, actions, costs, loop))
+            solved = [partial(each.solved_by, by_name=actions, settings=loop) for each in rehearsed if each.failed]
+            means = replace(means, order=best_order(tuple(actions), costs, solved, loop.budget))
         if any(entry.gated for entry in entries):
             parts = registered | {"rehearsals": rehearsed}
             means = replace(means, gate=closed_loop.rehearsed_gate(parts, recovery["gate"]["false_alarms"]))
@@ -90,16 +92,6 @@ def run(job: Job) -> None:
         write_csv(job.timings, seconds)
         views = recovery["actions"].get(ACTION) or {}
         save_example(job.example, episodes, rows, {ACTION: action_of(ACTION, views)} | actions, views, loop, axes)
-
-
-def lay_tables(
-    surfaces: Iterable[Surface], settings: RecoverySettings, source: str, seed: int
-) -> dict[str, Situations]:
-    """The situations of every part; source and seed name all that is random in them."""
-    surfaces = [simplified(surface) for surface in surfaces]
-    recovery = settings.section
-    shelf = Shelf(surfaces, source, recovery["model_points"], InitialPoseSettings(**recovery["estimator"]))
-    return {part: Situations(shelf, settings.situation, (source, seed, part)) for part in PARTS}
 
 
 def register_situations(

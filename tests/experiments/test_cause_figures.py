@@ -35,10 +35,9 @@ def test_the_sample_shown_failed_by_several_causes_of_which_one_is_as_clear_as_u
     margins = causes.truth.margin[clear if len(clear) else several]
     assert causes.truth.margin[row] in margins[margins >= np.median(margins)]
     assert (margins >= causes.truth.margin[row]).mean() >= 0.5 or len(margins) == 1
+    train = causes.subset(causes.rows("train"))
     with pytest.raises(InputError, match="has no failed test sample"):
-        cause_figures.usual_failure(
-            causes.subset(causes.rows("train")), "causes.npz", cause_figures.is_clear(causes)[causes.rows("train")]
-        )
+        cause_figures.usual_failure(train, "causes.npz", cause_figures.is_clear(train))
 
 
 def test_what_was_measured_stands_apart_from_the_scores_and_the_largest_of_a_row_is_bold():
@@ -46,10 +45,9 @@ def test_what_was_measured_stands_apart_from_the_scores_and_the_largest_of_a_row
 
     figure, panel = plt.subplots()
     numbers = np.array([[0.0, 0.5, 0.3, 0.2], [0.1, 0.2, 0.9, 0.8], [0.7, 0.1, 0.1, 0.1]])
-    answers = zip(
-        (cause_figures.TRUTH, "Multi-label", "Right"), zip(numbers, ("", "wrong", "tie"), strict=True), strict=True
-    )
-    cause_figures._draw_scores(panel, dict(answers))
+    scored = zip(numbers, ("", "wrong", "tie"), strict=True)
+    answers = dict(zip((cause_figures.TRUTH, "Multi-label", "Right"), scored, strict=True))
+    cause_figures._draw_scores(panel, answers)
     assert panel.get_yticks().tolist() == [0, 1 + cause_figures.GAP, 2 + cause_figures.GAP]
     bold = {text.get_text() for text in panel.texts if text.get_fontweight() == "bold"}
     assert bold == {"0.50", "0.90", "0.70", "", "tie"}

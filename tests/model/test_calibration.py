@@ -44,9 +44,8 @@ def test_what_is_promised_holds_of_the_labeled_and_no_state_contradicts_the_alar
     }  # fmt: skip
     inside_N_2 = guarantee.sets(np.column_stack([1 - result_N, result_N]))
     assert 0.9 <= np.where(right_N, *inside_N_2.T).mean() < 0.93
-    assert [line.split(":")[0] for line in given.report()][1:] == [
-        f"{of:10}promised" for of in ("missed", "alarms", "sets")
-    ]
+    promised = [line.split(":")[0] for line in given.report()][1:]
+    assert promised == [f"{of:10}promised" for of in ("missed", "alarms", "sets")]
 
 
 def test_what_is_missing_is_counted_for_each_risk():

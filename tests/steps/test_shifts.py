@@ -101,12 +101,11 @@ def test_an_encoder_whose_families_are_all_asked_about_is_not_even_loaded(folder
     monkeypatch.setattr(diagnosis, "with_what_it_reads", lambda _, reads, path: {"a": every, "b": elsewhere}[path])
     monkeypatch.setattr("gpca.encoders.training.load_model", lambda weights, *_: {2.0: 2.0}[weights])  # no other
     monkeypatch.setattr("gpca.encoders.training.embed", lambda model, *_: (np.full((len(every), 1), model), None))
-    settings = {"encoder": {}, "descriptors": {}, "reenactment": {}}
 
     def prepared(*names):
         files = {"causes": [folder / "standard/causes/four/seed100.npz"] * len(names), "embeddings": list(names)}
         files["encoders"] = [1.0 + place for place in range(len(names))]
-        job = Job(source="x", seed=100, settings=settings)
+        job = Job(source="x", seed=100, settings={"encoder": {}, "descriptors": {}, "reenactment": {}})
         return step.World(job, files, every, 13, lambda reads: every, apart=True).prepare("gpca")
 
     ((training, asked),) = prepared("a", "b")
@@ -118,9 +117,8 @@ def test_an_encoder_whose_families_are_all_asked_about_is_not_even_loaded(folder
 def test_measures_are_of_each_shift_and_of_their_mean(folder):
     rows = experiment.collect(RUN, [folder / "diagnoses/seed100.csv"], *truth_files(folder))
     assert list(rows.columns) == [*KEYS, *AGAINST, *NUMBERS]
-    of = rows[(rows["metric"] == "false_alarm_rate") & (rows["against"] == "")].set_index(["method", "concept"])[
-        "value"
-    ]
+    chosen = rows[(rows["metric"] == "false_alarm_rate") & (rows["against"] == "")]
+    of = chosen.set_index(["method", "concept"])["value"]
     for name in EXPLAINERS:
         assert of[name, "mean"] == pytest.approx((of[name, "scaled"] + of[name, "planes"]) / 2)
         assert of[name, "drop"] == pytest.approx(of[name, "mean"] - of[name, "standard"])

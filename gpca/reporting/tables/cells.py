@@ -58,8 +58,7 @@ def share_within_limits(cell: Cell, column: Column) -> Cell:
 def cautious_cell(values_R: Collection[float], test_samples: int, clusters: int) -> Cell | None:
     """Return the mean of a share in % over R seeds of which no single answers are kept, or None without any seed.
 
-    Its bounds are the farther ones of the t-interval over the seeds, where there are enough of them, and of Wilson's,
-    in which a cluster counts once in each seed.
+    Its bounds are those of :func:`_farther_bounds`, in which a cluster counts once in each seed.
     """
     cell = cell_of_repeats(values_R, test_samples, clusters=clusters)
     if cell is None or not clusters:

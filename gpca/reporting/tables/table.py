@@ -1,7 +1,4 @@
-"""Writes a table as CSV for machines, Markdown for readers and JSON for the page.
-
-Readers get pooled rows, the best first and trivial ones last, if the whole does not fit a page.
-"""
+"""Writes a table as CSV for machines, Markdown for readers (:func:`short`) and JSON for the page."""
 
 import csv
 import json
@@ -98,10 +95,7 @@ class Table:
         return best
 
     def write(self, stem: str | Path) -> None:
-        """Write ``{stem}.csv``, ``.md`` and, for the page, ``.json``: each whole or not at all.
-
-        Markdown has the part that readers need (:func:`short`), JSON both.
-        """
+        """Write ``{stem}.csv``, ``.md`` (:func:`short`), ``.json`` (both, for the page), each whole or not at all."""
         part = short(self)
         words = left_out(self, part)
         both = self.printed() | ({"short": part.printed() | {"left_out": words}} if words else {})
