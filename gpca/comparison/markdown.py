@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Mapping
 
 from gpca.comparison.chance import ALL, SHUFFLES, chance
-from gpca.comparison.published import HARDWARE, TEXT, TITLES
+from gpca.comparison.published import HARDWARE, TEXT, table_in_words
 from gpca.comparison.verdicts import DECIDED, PAPER_TOO_WIDE, VERDICTS, Tolerance, counts, judged_once
 from gpca.io.frame import Frame
 from gpca.objects.entry import STAND_IN
@@ -36,7 +36,7 @@ def comparison_markdown(comparison: Frame, tolerances: Mapping[str, Tolerance]) 
     parts.append(f"Times of the paper were measured on {' and '.join(HARDWARE.values())}.")
     for table, rows in comparison.groupby("table", sort=False):
         number_of = {reason: number for number, reason in enumerate(_distinct(rows["reason"]), start=1)}
-        parts += [f"## {_name(table)}", _table(rows, number_of)]
+        parts += [f"## {table_in_words(table)}", _table(rows, number_of)]
         parts.append("\n".join(f"{number}. {reason}" for reason, number in number_of.items()))
         shown = rows[rows["reproduced"].notna()]
         seen_on = {name: "; ".join(_distinct(shown[name])) for name in ("objects", "hardware")}
@@ -79,7 +79,7 @@ def counts_table(comparison: Frame, tolerances: Mapping[str, Tolerance]) -> str:
 
     lines: list[list] = [["", *VERDICTS, *_CHANCE], [":--"] + ["--:"] * len(VERDICTS + _CHANCE)]
     for table, rows in once.groupby("table", sort=False):
-        lines.append([_name(table), *(count or "" for count in counts(rows).values()), *cells(table)])
+        lines.append([table_in_words(table), *(count or "" for count in counts(rows).values()), *cells(table)])
     lines.append(["All", *counts(once).values(), *cells(ALL)])
     over_objects = once.assign(verdict=once["over_objects"])
     apart = {"All, by intervals over objects too": over_objects, "Standard deviations": deviations, "Repeats": repeats}
@@ -93,10 +93,6 @@ def _parts(comparison: Frame) -> tuple[Frame, Frame, Frame]:
     """Return means judged once, standard deviations, and repeats."""
     repeats = comparison["repeat_of"] != ""
     return judged_once(comparison), comparison[(comparison["statistic"] == "deviation") & ~repeats], comparison[repeats]
-
-
-def _name(table: str) -> str:
-    return TITLES[table] if table == TEXT else f"Table {table}: {TITLES[table]}"
 
 
 def _distinct(texts: Iterable[str]) -> list[str]:

@@ -47,6 +47,10 @@ TITLES = {  # of the paper's tables, in words
 }
 
 
+def table_in_words(table: str) -> str:
+    return TITLES[TEXT] if table == TEXT else f"Table {table}: {TITLES.get(table, '')}"
+
+
 @dataclass(frozen=True)
 class Counterpart:
     """The value of a run beside a printed number; ``runtime.csv`` has components, "model" and a device as concept."""

@@ -124,7 +124,9 @@ def fig3_concepts(run: Run, objects_file: Path, registrations_file: Path) -> Fig
     row = objects.row(name)
     points_shown = max(len(source) for source in sources.values())  # so that both clouds are equally dense
     target = objects.points(row)[:points_shown] / objects.diameters_m[row]
-    view = choose_view(target, sources)
+    # Of the directions that show the object widest, that in which pose error and cut shift the centroid most.
+    shifts = [sources[concept].mean(axis=0) - target.mean(axis=0) for concept in ("pose", "overlap")]
+    view = max(widest_views(target), key=lambda view: np.prod([np.linalg.norm(view[:2] @ shift) for shift in shifts]))
 
     clouds = {concept: (target @ view.T, source @ view.T) for concept, source in sources.items()}
     corners = np.concatenate([np.concatenate(pair) for pair in clouds.values()])
@@ -156,15 +158,6 @@ def choose_samples(registrations: Registrations, path: str | Path) -> dict[str, 
     if not choices:
         raise InputError(path, "has no test sample of each concept for any object", "generate more")
     return min(choices, key=lambda samples: max(distance_S[sample] for sample in samples.values()))
-
-
-def choose_view(target: np.ndarray, sources: dict[str, np.ndarray]) -> np.ndarray:
-    """Rotation (3, 3) to a view's right, up and towards-the-viewer axes, with z up in the world.
-
-    Of the directions that show the object widest, it is that in which pose error and cut shift the centroid most.
-    """
-    shifts = [sources[concept].mean(axis=0) - target.mean(axis=0) for concept in ("pose", "overlap")]
-    return max(widest_views(target), key=lambda view: np.prod([np.linalg.norm(view[:2] @ shift) for shift in shifts]))
 
 
 @figure(

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
-from gpca.comparison.published import TEXT, TITLES
+from gpca.comparison.published import table_in_words
 from gpca.comparison.verdicts import CLOSE, COMPARISON_COLUMNS, NOT_REPRODUCED, REPRODUCED
 from gpca.errors import refusing
 from gpca.io.csv_file import read_csv
@@ -33,9 +33,7 @@ def page_comparison(path: str | Path) -> dict | None:
         for row in table_rows:
             if len(objects) == 1 or any(row["objects"].startswith(row[key]) for key in ("row", "column")):
                 row["objects"] = ""
-        title = TITLES.get(name, "")
-        words = title if name == TEXT else f"Table {name}: {title}"
-        tables.append({"name": name, "title": words, "objects": "; ".join(objects), "rows": table_rows})
+        tables.append({"name": name, "title": table_in_words(name), "objects": "; ".join(objects), "rows": table_rows})
     counts = Counter(row["group"] for row in rows)
     order = [*TONES, *sorted(set(counts) - {*TONES, DEVIATION, REPEAT}), DEVIATION, REPEAT]
     return {

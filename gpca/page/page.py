@@ -18,7 +18,6 @@ from gpca.model.scene import ASSETS
 from gpca.page.comparison import page_comparison
 from gpca.page.findings import Titles, findings_of
 from gpca.page.samples import POINTS, RULE, cause_samples
-from gpca.reporting.registry import Result
 
 TEMPLATES = Path(__file__).parent / "templates"
 KEY_FIGURES = ("causes_example", "fig2_overview")  # the first of these that the run has opens the page
@@ -42,13 +41,24 @@ _NAMES = re.compile(  # links and tags stay as they are
 
 
 @dataclass(frozen=True)
+class Shown:
+    """A table or figure; the attributes are those of :class:`gpca.reporting.registry.Result`."""
+
+    name: str
+    kind: str
+    section: str
+    title: str
+    caption: str
+
+
+@dataclass(frozen=True)
 class FinishedRun:
     """A run with what its page needs besides its results."""
 
     name: str
     seeds: Sequence[int]  # of its repeats
     sources: Mapping[str, Mapping]  # name -> ``{"title": str, "stand_in": bool}``
-    results: Sequence[Result]  # tables and figures, in order
+    results: Sequence[Shown]  # tables and figures, in order
     causes: Mapping[str, Mapping[str, str]]  # source -> files for :func:`cause_samples`
     titles: Titles  # of the explainers
     config: Mapping  # the whole configuration
@@ -138,7 +148,7 @@ def read_provenance(files: Iterable[Path]) -> dict[str, dict[str, int]]:
     return {fact: dict(counts.most_common()) for fact, counts in facts.items()}
 
 
-def _content(folder: Path, result: Result, run: FinishedRun, links: Links) -> dict:
+def _content(folder: Path, result: Shown, run: FinishedRun, links: Links) -> dict:
     """Return one table or figure for the template."""
     from PIL import Image
 

@@ -38,7 +38,7 @@ def _cache_folder() -> Path:
 
 
 class Compilations(Listener):
-    """Calls a function before each."""
+    """Calls a function before each compilation."""
 
     def __init__(self, before: Callable[[], None]) -> None:
         self._before = before

@@ -1,10 +1,9 @@
 """A small run whose page is tested, and that page read by a parser."""
 
 from html.parser import HTMLParser
-from types import SimpleNamespace
 
 from gpca.page.findings import Titles
-from gpca.page.page import FinishedRun
+from gpca.page.page import FinishedRun, Shown
 from tests.conftest import FEW_CAUSES
 
 TABLES = ["table2_per_concept", "table1_single_baselines", "table4_mine"]
@@ -35,7 +34,7 @@ class Page(HTMLParser):
 def results(captions=()):
     """All tables and figures by section, with a caption of its own where one is given."""
     return [
-        SimpleNamespace(
+        Shown(
             name=name,
             kind="tables" if name in TABLES else "figures",
             section=section,
