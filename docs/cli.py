@@ -83,7 +83,7 @@ def meaning(action: argparse.Action) -> str:
     """Return the help of an argument, with its choices and whether it is required."""
     chosen = one_of(action.choices) if action.choices else ""
     needed = "required" if action.option_strings and action.required else ""
-    return "; ".join(filter(None, [str(action.help), chosen, needed]))
+    return "; ".join(filter(None, [(action.help or "").replace("%%", "%"), chosen, needed]))
 
 
 def one_of(choices: Iterable[str]) -> str:

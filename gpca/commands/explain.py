@@ -154,7 +154,7 @@ def add_registration_arguments(parser: ArgumentParser, given_pose: str) -> None:
     add("--pose", type=Path, help=f"such a file with a pose that is {given_pose}")
     add("--tolerance", help="how far the pose may be off: 5mm, 2deg or a share of the diameter (default 3%%)")
     add("--unit", choices=METERS_PER_UNIT, default="m", help="unit of files, pose and results (default m)")
-    add("--source-unit", choices=METERS_PER_UNIT, help="unit of the sources, if another one")
+    add("--source-unit", choices=METERS_PER_UNIT, help="unit of the sources, if it differs")
     add("--model", type=Path, help="model file (default: GPCA_MODEL, one in ./results/, or the package's)")
     add("--method", help="registration method, such as gicp (default: the model's ICP)")
     add("--html", type=Path, metavar="FILE", help="write a page with all results and 3-D views")

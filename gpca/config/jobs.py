@@ -40,12 +40,13 @@ def export_to_jobs(config: Mapping, source_folder: str | Path = ROOT) -> None:
     pin_instructions()
 
 
-def clear_leftovers(main: bool = True, folder: Path = Path(".snakemake")) -> None:
+def clear_leftovers(main: bool = True) -> None:
     """Lock the working directory, and clear the leftovers of killed Snakemakes if no other one is running.
 
-    All running Snakemakes share a kernel lock of ``running`` in Snakemake's `folder`, which ends with them, unlike its
+    All running Snakemakes share a kernel lock of ``running`` in Snakemake's folder, which ends with them, unlike its
     own locks; one that gets it exclusively is alone. One that is not `main` was started for a job, and clears nothing.
     """
+    folder = Path(".snakemake")
     try:
         folder.mkdir(exist_ok=True)
         file = (folder / "running").open("a+", encoding="utf-8")
