@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 
 from gpca.comparison.chance import ALL, SHUFFLES, chance
 from gpca.comparison.published import HARDWARE, TEXT, table_in_words
-from gpca.comparison.verdicts import DECIDED, PAPER_TOO_WIDE, VERDICTS, Tolerance, counts, judged_once
+from gpca.comparison.verdicts import DECIDED, LOWER_BOUND, PAPER_TOO_WIDE, VERDICTS, Tolerance, counts, judged_once
 from gpca.io.frame import Frame
 from gpca.objects.entry import STAND_IN
 from gpca.reporting.tables.table import EMPTY
@@ -55,8 +55,15 @@ def summary(comparison: Frame) -> str:
     parts = [f"{is_decided.sum()} decided ({in_words(once[is_decided])})"] if is_decided.any() else []
     parts += [in_words(once[~is_decided])] if not is_decided.all() else []
     sentences = [f"Of {len(comparison)} printed numbers, {len(once)} are means, each judged once: {', '.join(parts)}."]
+    kinds = []
     if by_paper := (once["reason"] == PAPER_TOO_WIDE).sum():
-        sentences.append(f"No run can decide {by_paper} of the latter, as the paper's own interval is too wide.")
+        kinds.append(f"no run can decide {by_paper}, as the paper's own interval is too wide")
+    if bounds := (once["reason"] == LOWER_BOUND).sum():
+        kinds.append(f"{bounds} are lower bounds, which take a larger pool")
+    if len(needed := once["n_needed"].dropna()):
+        kinds.append(f"{len(needed)} take more seeds, {needed.min():.0f} to {needed.max():.0f}")
+    if kinds:
+        sentences.append(f"Of the inconclusive means, {'; '.join(kinds)}.")
     if len(deviations):
         sentences.append(f"{len(deviations)} are standard deviations: {in_words(deviations)}.")
     if len(repeats):
