@@ -35,9 +35,9 @@ def test_the_sample_shown_failed_by_several_causes_of_which_one_is_as_clear_as_u
     margins = causes.truth.margin[clear if len(clear) else several]
     assert causes.truth.margin[row] in margins[margins >= np.median(margins)]
     assert (margins >= causes.truth.margin[row]).mean() >= 0.5 or len(margins) == 1
-    train = causes.subset(causes.rows("train"))
+    train = causes.rows("train")
     with pytest.raises(InputError, match="has no failed test sample"):
-        cause_figures.usual_failure(train, "causes.npz", cause_figures.is_clear(train))
+        cause_figures.usual_failure(causes.subset(train), "causes.npz", cause_figures.is_clear(causes)[train])
 
 
 def test_what_was_measured_stands_apart_from_the_scores_and_the_largest_of_a_row_is_bold():
