@@ -9,6 +9,7 @@ from gpca.comparison.verdicts import DECIDED, LOWER_BOUND, PAPER_TOO_WIDE, VERDI
 from gpca.io.frame import Frame
 from gpca.objects.entry import STAND_IN
 from gpca.reporting.tables.table import EMPTY
+from gpca.reporting.words import span
 
 _HEADS = ("Row", "Column", "Unit", "Paper", "Here", "Over objects", "n", "n needed", "Difference", "Verdict")
 _CHANCE = ("by chance", "p", "ρ")
@@ -59,9 +60,9 @@ def summary(comparison: Frame) -> str:
     if by_paper := (once["reason"] == PAPER_TOO_WIDE).sum():
         kinds.append(f"no run can decide {by_paper}, as the paper's own interval is too wide")
     if bounds := (once["reason"] == LOWER_BOUND).sum():
-        kinds.append(f"{bounds} are lower bounds, which take a larger pool")
+        kinds.append(f"{bounds} are lower bounds, which need a larger pool")
     if len(needed := once["n_needed"].dropna()):
-        kinds.append(f"{len(needed)} take more seeds, {needed.min():.0f} to {needed.max():.0f}")
+        kinds.append(f"{len(needed)} need {span(needed)} seeds")
     if kinds:
         sentences.append(f"Of the inconclusive means, {'; '.join(kinds)}.")
     if len(deviations):

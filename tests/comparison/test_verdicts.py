@@ -90,7 +90,7 @@ def test_an_undecided_number_says_how_many_repeats_would_decide_it():
     results = {"metrics.csv": tidy([0.86, 0.94, 0.9, 0.9])}
     [row] = (rows := compared([number()], results)).itertuples()
     assert (row.verdict, row.n_needed > row.n) == ("inconclusive", True)
-    assert f"inconclusive means, 1 take more seeds, {row.n_needed} to {row.n_needed}." in summary(rows)
+    assert f"inconclusive means, 1 need {row.n_needed} seeds." in summary(rows)
     rows = compared([number(paper_n=50)], results)
     assert (rows["reason"][0], rows["n_needed"][0] is pd.NA) == (verdicts.PAPER_TOO_WIDE, True)
     assert "means, no run can decide 1, as the paper's own interval is too wide." in summary(rows)
