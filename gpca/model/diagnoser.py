@@ -140,7 +140,8 @@ class Diagnoser:
         # A partial target has open ends, too. But of 56 right results that lacked 30 % of it, none had a wrong scale;
         # with open ends, four more would be called free in some direction.
         reenacted = reenacted.with_fit(observed, T_icp, surface, open_ends=False)
-        distance_K = enactments[0].errors(T_icp @ inverses(row["T_model_observed"]))
+        errors = surface.errors_up_to_symmetry if surface.symmetric else enactments[0].errors
+        distance_K = errors(T_icp @ inverses(row["T_model_observed"]))
         evidence = Evidence(distance_K[None], row["weight"][None], pair.inlier_rmse_n[:1], pair.fitness_n[:1])
         return reenactment_features(Reenactments.of_rows([row], self.truth))[0], evidence, reenacted, enactments
 

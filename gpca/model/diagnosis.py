@@ -295,7 +295,7 @@ class Diagnosis:
     causes: dict[str, float]  # probability of each concept to be a cause, given a failure
     variances: dict[str, float]  # their variances over the posterior draws (Eq. 5).
     bald: float  # largest BALD among the questions, nats (Eq. 7).
-    expected_error: float  # expected error of this pose: ADD, or ADD-S of a symmetric object
+    expected_error: float  # expected error of this pose: ADD, up to the target's symmetry
     unlikeness: float  # distance to the training samples, scaled so that 1 % of them exceed 1
     void: bool  # whether the pair is such that no number here means anything (:mod:`gpca.model.clouds`)
     guarantee: Guaranteed | None  # set of states and alarm; None in fast diagnoses

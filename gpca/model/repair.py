@@ -94,7 +94,10 @@ class TruePoses:
     def errors(self, T_n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return errors (n, k) of poses (n, 4, 4), and how probable each error is."""
         back_k = inverses(self.T_k)
-        return np.stack([self.whole.errors(T @ back_k) for T in T_n]), np.tile(self.weight_k, (len(T_n), 1))
+        distance_n_K = np.stack([self.whole.errors_up_to_symmetry(T @ back_k[:-1]) for T in T_n])
+        # The other estimate is so rough that along a symmetric shape it says little.
+        rough_n_1 = np.stack([self.whole.errors(T @ back_k[-1:]) for T in T_n])
+        return np.hstack([distance_n_K, rough_n_1]), np.tile(self.weight_k, (len(T_n), 1))
 
 
 def best_end(observed: np.ndarray, surface: ModelSurface) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
@@ -9,11 +10,11 @@ from scipy.spatial import cKDTree
 
 from gpca.alignment.batched_icp import make_target
 from gpca.causes.truth import LARGEST_ERROR
-from gpca.objects.bop import find_symmetries
+from gpca.objects.bop import find_symmetries, symmetric_turn
 from gpca.pairs.distances import second_moments
 from gpca.reenactment.regions import DIRECTIONS, Regions, directions
 from gpca.reenactment.surface_kernels import nearest_rows, shares_within, surface_distances
-from gpca.rigid import dots
+from gpca.rigid import dots, rigid_motion
 
 JUDGED = 256  # points over which an error is the mean
 COMPARED = 64  # points that tell whether two poses are the same
@@ -22,6 +23,8 @@ TRIMMED = 0.94  # share of the residuals that count, the smallest: outliers are 
 LEAST_SPACING = 1e-4  # diameters; a user's cloud may hold every point twice
 # A turn is a symmetry if the mean distance from the surface is at most SYMMETRIC + SPARSE · spacing + NOISY · noise.
 SYMMETRIC, SPARSE, NOISY = 0.012, 0.25, 0.2
+# A part beyond this share of them, such as a handle, shows where a symmetric shape is if it moves by so many limits.
+PROTRUDING, MOVED = 0.97, 3.5
 CORNER = 1.5  # of the spacing: so far from a point, along its plane, its surface reaches
 
 
@@ -48,9 +51,12 @@ class ModelSurface:
     @cached_property
     def symmetries(self) -> dict[str, list]:
         """The turns that leave the shape as it is (:func:`gpca.objects.bop.find_symmetries`)."""
+        return self._turns(self.distances)
+
+    def _turns(self, distances: Callable[[np.ndarray], np.ndarray]) -> dict[str, list]:
         limit = SYMMETRIC + SPARSE * self.spacing + NOISY * self.noise
         centered = self.points[:JUDGED] - self.center
-        return find_symmetries(centered, 1.0, lambda points: self.distances(points + self.center), limit)
+        return find_symmetries(centered, 1.0, lambda points: distances(points + self.center), limit)
 
     @property
     def symmetric(self) -> bool:
@@ -83,6 +89,26 @@ class ModelSurface:
         if self.symmetric:
             return self.distances(moved.reshape(-1, 3)).reshape(moved.shape[:2]).mean(axis=1)
         return np.sqrt(np.square(moved - points).sum(axis=2)).mean(axis=1)
+
+    def errors_up_to_symmetry(self, T_n: np.ndarray) -> np.ndarray:
+        """Return the errors (n,) of poses (n, 4, 4) where the identity is right: ADD from the nearest of the poses at
+        which the model looks the same, as in BOP's MSSD. :meth:`errors` hardly sees a box that slides along itself."""
+        if not self.symmetric:
+            return self.errors(T_n)
+        turns_n = np.array([symmetric_turn(T[:3, :3], self._equivalent) for T in T_n])
+        about_center_n = rigid_motion(turns_n, self.center - turns_n @ self.center)
+        points = self.points[:JUDGED]
+        return np.sqrt(np.square(_moved(T_n @ about_center_n, points) - points).sum(axis=2)).mean(axis=1)
+
+    @cached_property
+    def _equivalent(self) -> dict[str, list]:
+        """The symmetries after which no part, such as a handle, lies elsewhere."""
+
+        def uneven(points: np.ndarray) -> np.ndarray:
+            distance_N = np.sort(self.distances(points))
+            return np.maximum(distance_N.mean(), distance_N[int(PROTRUDING * len(distance_N))] / MOVED)
+
+        return self._turns(uneven)
 
     def completed(self, points: np.ndarray, noise: float) -> ModelSurface:
         """Return the surface with noisy points (N, 3) of the part that the model lacks."""

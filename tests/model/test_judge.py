@@ -12,6 +12,7 @@ from gpca.causes.truth import FAILED
 from gpca.errors import InputError
 from gpca.model.diagnosis import RERUN
 from gpca.model.explanation import GIVEN
+from gpca.model.location import SHIPPED
 from gpca.rigid import exp, transform
 
 
@@ -101,3 +102,18 @@ def test_a_pose_that_is_no_pose_is_refused(explainer, pair):
     with pytest.raises(InputError, match="initial pose"):
         explainer.judge(*pair, np.diag([1.0, 1, -1, 1]))
     assert "judge" in gpca.__all__
+
+
+def test_a_box_that_slid_along_itself_is_wrong_and_one_that_was_turned_over_is_not():
+    random = np.random.default_rng(100)
+    size = np.array([0.072, 0.164, 0.213])
+    points = random.uniform(-0.5, 0.5, size=(3000, 3))
+    axis = random.choice(3, size=len(points), p=(1 / size) / (1 / size).sum())
+    points[np.arange(len(points)), axis] = random.choice([-0.5, 0.5], size=len(points))
+    source, target = np.split(points * size, 2)
+    shipped = gpca.Explainer.load(SHIPPED)
+    turned = exp(np.array([[np.pi, 0, 0, 0, 0, 0]]))[0]
+    assert shipped.judge(source, target, turned).diagnosis.state != FAILED
+    slid = np.eye(4)
+    slid[2, 3] = 0.03
+    assert shipped.judge(source, target, slid).diagnosis.state == FAILED

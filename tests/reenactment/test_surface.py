@@ -34,6 +34,41 @@ def test_a_can_turned_about_its_axis_is_where_it_was_and_poses_are_as_far_apart_
     assert ModelSurface(drill[:400]).apart(turned)[0] > 0.05
 
 
+def surface_of_boxes(*sizes_and_centers, count=400):
+    """Points spread evenly over boxes, each by its size and center."""
+    random, parts = np.random.default_rng(100), []
+    for size, center in sizes_and_centers:
+        points = random.uniform(-0.5, 0.5, size=(count * 6, 3)) * size
+        axis, side = random.integers(3, size=len(points)), random.choice([-0.5, 0.5], size=len(points))
+        points[np.arange(len(points)), axis] = side * np.array(size)[axis]
+        parts.append(points[: round(count * np.prod(size) ** (2 / 3) / 0.08)] + center)
+    return random.permutation(np.concatenate(parts))
+
+
+BOX = ((0.3, 0.5, 0.75), (0, 0, 0))
+SLIDE, OVER = exp(np.array([[0, 0, 0, 0, 0, 0.1], [np.pi, 0, 0, 0, 0, 0]]))
+
+
+def test_up_to_symmetry_a_box_that_slides_along_itself_is_as_wrong_as_it_slides():
+    surface = ModelSurface(surface_of_boxes(BOX))
+    poses = np.array([np.eye(4), SLIDE, OVER, SLIDE @ OVER])
+    assert surface.symmetric
+    assert surface.errors(poses).max() < 0.04
+    assert surface.errors_up_to_symmetry(poses) == pytest.approx([0, 0.1, 0, 0.1], abs=1e-9)
+
+
+def test_up_to_symmetry_a_can_may_turn_and_not_slide(can, drill, model):
+    surface, turned = ModelSurface(can[:400]), exp(np.array([[0, 0, 1.0, 0, 0, 0], [0, 0, 1.0, 0, 0, 0.1]]))
+    assert surface.errors_up_to_symmetry(turned) == pytest.approx([0, 0.1], abs=1e-9)
+    assert np.array_equal(model.errors_up_to_symmetry(turned), model.errors(turned))
+
+
+def test_up_to_symmetry_a_knob_counts_that_distances_hardly_see():
+    knobbed = ModelSurface(surface_of_boxes(BOX, ((0.12, 0.12, 0.12), (0.21, 0, 0.3))))
+    assert knobbed.symmetric
+    assert knobbed.errors_up_to_symmetry(OVER[None])[0] > 0.2
+
+
 def test_distances_are_those_from_planes_within_reach_and_count_as_errors_beyond(drill, model):
     points = drill[400:500] + np.random.default_rng(1).normal(scale=0.03, size=(100, 3))
     rows = np.linalg.norm(model.points[:, None] - points, axis=2).argmin(axis=0)
