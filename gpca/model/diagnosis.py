@@ -29,7 +29,7 @@ LIKELY = 0.5  # probability from which a concept is named as a cause
 SMALLEST = 1e-9  # least probability of a cause
 IN_WORDS = {SEVERAL: "several causes"}
 AS_FAR = "initial poses this far off"
-NO_GUARANTEE = "guarantee none: a fast explanation, an unusual tolerance, or a model without one"
+NO_GUARANTEE = "guarantee none: a fast explanation, an unusual pair or tolerance, or a model without one"
 SMALL_TURN_DEG = 3.0  # smaller rotations are not mentioned
 CHECK = "check"  # action for a pair whose scores mean nothing
 RERUN = "rerun"  # action where the re-enactment knows a better pose
@@ -320,13 +320,17 @@ class Diagnosis:
         if named := " and ".join(self.named):
             return named
         nothing = "no failure is shown" if self.doubtful else "nothing is wrong"
-        return f"{nothing}, but {caveat}" if (caveat := self.reenacted.caveat) else nothing
+        return f"{nothing}, but {self.caveat}" if self.caveat else nothing
+
+    @property
+    def caveat(self) -> str:
+        """What a right result leaves open; empty if nothing."""
+        return self.reenacted.caveat
 
     @property
     def doubtful(self) -> bool:
         """Whether the alarm is not sure, so that no promise holds for the state."""
-        guarantee = None if self.void or self.wrong_scale else self.guarantee
-        return guarantee is not None and guarantee.call == NOT_SURE
+        return self.guarantee is not None and self.guarantee.call == NOT_SURE
 
     @property
     def remark(self) -> str:
@@ -355,7 +359,7 @@ class Diagnosis:
             "state": self.state,
             "named": list(self.named),
             "doubtful": self.doubtful,
-            "caveat": self.reenacted.caveat,
+            "caveat": self.caveat,
         }
 
     def lines(self, unit: str, verbose: bool) -> list[str]:

@@ -88,6 +88,8 @@ class Explainer:
             aligned = clouds.source, clouds.target, T_found
             diagnosis, enactments = diagnoser.diagnose(*aligned, register, limit / clouds.frame.diameter)
         diagnosis = replace(outside(diagnosis, clouds.frame, clouds.T_target_source_init), void=bool(voids))
+        if diagnosis.void or diagnosis.wrong_scale:  # of which calibration knew nothing
+            diagnosis = replace(diagnosis, guarantee=None)
         notes += [FAST] if fast else []
         with _timed(seconds, "embedding"):
             h_1_d = self.embed(transform(T_found, clouds.source))

@@ -142,9 +142,12 @@ class ExplainedRegistration:
         return ()
 
     def save_pose(self, path: str | Path) -> None:
-        """Write :attr:`fitting_pose` as text, row by row, to its last digit."""
+        """Write :attr:`fitting_pose` to its last digit: as npy if the name ends so, otherwise as text, row by row."""
         with whole_file(path) as partial:
-            np.savetxt(partial, self.fitting_pose, fmt="%.17g")
+            if partial.suffix.lower() == ".npy":
+                np.save(partial, self.fitting_pose)
+            else:
+                np.savetxt(partial, self.fitting_pose, fmt="%.17g")
 
     def save_html(self, path: str | Path, names: Mapping[str, str] | None = None) -> None:
         """Write :meth:`html` to a file."""

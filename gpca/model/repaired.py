@@ -27,9 +27,10 @@ from gpca.reenactment.dataset import described
 from gpca.reenactment.enactment import Enactment
 from gpca.reenactment.hypotheses import weights_of
 from gpca.reenactment.registration import pose_posterior
+from gpca.reenactment.scale import find_scale
 from gpca.reenactment.surface import ModelSurface
 from gpca.rigid import transform
-from gpca.seeds import seed_of
+from gpca.seeds import generator, seed_of
 
 STATUSES = {GOOD: 0, REPAIRED: 0, UNKNOWN: UNKNOWN_STATUS, NOT_REPAIRED: 4, SEVERAL: 5}  # exit codes of the command
 ACTIONS = {GOOD: NOTHING, REPAIRED: TAKE}  # for the others, `CHECK`
@@ -145,6 +146,9 @@ class Repair(ExplainedRegistration):
         errors_n = diagnoser.judge.error(proposals.evidence)
         poses = [outside(pose, frame, T_init) for pose in other_poses(proposals, verdict, errors_n, surface)]
         T_best = proposals.T_n[verdict.row or 1]
+        scale = find_scale(before, [proposals.T_n[verdict.row], T_best], surface, generator("repair", "scale"))
+        if scale is not None and scale.off and scale.error > tolerance:
+            return replace(repaired, reason=scale.advice, wrong=None)
         if verdict.name != GOOD:
             outliers, missing = repair.unseen(clouds.source, surface, T_best)
             free = undetermined_at(transform(T_best, before), surface)

@@ -172,8 +172,11 @@ class CanonicalFrame:
 def require_cloud_points(points: np.ndarray, subject: object) -> None:
     """Raise an InputError unless the points are (N, 3), finite, and enough for the encoders."""
     require_points(points, subject)
-    if len(points) < FEWEST_CLOUD_POINTS:
-        raise InputError(subject, f"has {len(points)} points", f"give {FEWEST_CLOUD_POINTS} or more")
+    few = len(points) < 100 * FEWEST_CLOUD_POINTS  # more need not be counted
+    count = len(np.unique(points, axis=0)) if few else len(points)
+    if len(points) < FEWEST_CLOUD_POINTS or 1 < count < FEWEST_CLOUD_POINTS:  # a single place has a line of its own
+        held = f"{len(points)} points" if count in (1, len(points)) else f"{count} distinct points"
+        raise InputError(subject, f"has {held}", f"give {FEWEST_CLOUD_POINTS} or more")
 
 
 def thin(points: np.ndarray, most: int, *axes: object) -> np.ndarray:

@@ -138,6 +138,8 @@ def test_a_script_ends_with_one_line_of_its_fault_or_the_provenance_of_data_and_
 ASCII = {"PYTHONIOENCODING": "ascii"}
 C_LOCALE = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
 HELP = [sys.executable, "-m", "gpca", "--help"]
+MUCH = "from gpca.jobs.job import as_process; raise SystemExit(as_process('gpca', lambda: print('word ' * 100_000)))"
+PRINTING = [sys.executable, "-c", MUCH]
 
 
 def gpca(arguments, redirection="", **variables):
@@ -192,6 +194,7 @@ def test_a_fault_can_be_printed_in_ascii():
     [
         (HELP, "> /dev/full", "cannot be written (No space left on device)"),
         (HELP, "| (exec <&-; sleep 0); exit ${PIPESTATUS[0]}", "cannot be written (Broken pipe)"),
+        (PRINTING, "| (exec <&-; sleep 0); exit ${PIPESTATUS[0]}", "cannot be written (Broken pipe)"),
         ([*HELP[:-1], "check-config"], ">&-", "is closed; redirect it"),
     ],
 )

@@ -112,7 +112,7 @@ def test_a_turn_about_the_axis_of_a_symmetric_object_is_no_other_pose(explainer)
 
 def test_clouds_of_which_no_surface_can_be_made_are_explained_all_the_same(explainer):
     cloud = ell(64, 3)
-    for target in (np.repeat(cloud, 2, axis=0), cloud * np.array([1, 1, 0.0]), np.repeat(cloud[:5], 20, axis=0)):
+    for target in (np.repeat(cloud, 2, axis=0), cloud * np.array([1, 1, 0.0]), np.repeat(cloud, 20, axis=0)):
         said = explainer.explain(cloud, target).diagnosis
         assert np.isfinite([said.result, said.start, said.reenacted.error, *said.reenacted.effects.values()]).all()
 

@@ -50,6 +50,20 @@ def write(folder, source, target, T):
     np.savetxt(folder / "pose.txt", T)
 
 
+def test_a_pose_is_saved_as_its_name_says(explainer, pair, tmp_path):
+    judged = explainer.judge(*pair, np.eye(4))
+    judged.save_pose(tmp_path / "pose.npy")
+    judged.save_pose(tmp_path / "pose.txt")
+    np.testing.assert_array_equal(np.load(tmp_path / "pose.npy"), judged.fitting_pose)
+    np.testing.assert_array_equal(np.loadtxt(tmp_path / "pose.txt"), judged.fitting_pose)
+
+
+def test_points_that_are_repeated_do_not_count(explainer, pair):
+    source, target = pair
+    with pytest.raises(InputError, match="source: has 30 distinct points; give 64 or more"):
+        explainer.judge(np.repeat(source[:30], 10, axis=0), target, np.eye(4))
+
+
 def test_the_command_judges_a_pose_and_saves_the_one_that_fits(pair, saved, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     source, target = pair

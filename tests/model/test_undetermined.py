@@ -68,3 +68,15 @@ def test_flat_scans_are_not_measured_out_of_their_plane():
     assert said.state == "nominal"
     assert f"state     nominal, but {OUT_OF_PLANE}" in said.text()
     assert said.reenacted.undetermined.flat
+
+
+def test_a_wrong_scale_is_no_repair_and_no_promise(shipped, four):
+    points = np.random.default_rng(0).permutation(four.points(four.row("035_power_drill")).astype(float))
+    source, target = points[:1000], points[1000:2500]
+    large = source.mean(axis=0) + 1.15 * (source - source.mean(axis=0))
+    repair = shipped.repair(large, target, np.eye(4), register=False)
+    assert (repair.verdict, repair.status, repair.wrong) == ("unknown", 3, None)
+    assert "1.15 times too large" in repair.text() and "multiply its points by 0.8" in repair.text()
+    diagnosis = shipped.judge(large, target, np.eye(4)).diagnosis
+    assert diagnosis.guarantee is None and "1.15 times too large" in diagnosis.caveat
+    assert shipped.repair(source, target, np.eye(4), register=False).verdict == "good"
