@@ -60,8 +60,12 @@ def propose(
     weight_K: np.ndarray,
     refine: Refine,
     measure: Measure,
+    up_to_symmetry: bool = False,
 ) -> Proposals:
-    """Refine hypotheses (K, 4, 4) of the true pose of points (N, 3); a weight of 0 marks those that only fill up."""
+    """Refine hypotheses (K, 4, 4) of the true pose of points (N, 3); a weight of 0 marks those that only fill up.
+
+    Errors are those of the truth of samples, or up to symmetry, which a symmetric target that slid along itself fails.
+    """
     possible = np.flatnonzero(weight_K > 0)
     possible = possible[np.argsort(-weight_K[possible], kind="stable")]
     T_k = refine(observed, T_K[possible])
@@ -69,7 +73,7 @@ def propose(
     apart_k_n = np.stack([surface.apart(T_k @ inverse(T_k[row])) for row in rows], axis=1)
     weight_n = np.bincount(apart_k_n.argmin(axis=1), weight_K[possible], minlength=len(rows))
     T_n = np.concatenate([T_registered[None], T_k[rows]])
-    true_poses = TruePoses.of(observed, surface, T_K, weight_K)
+    true_poses = TruePoses.of(observed, surface, T_K, weight_K, up_to_symmetry)
     distance_n_K, weight_n_K = true_poses.errors(T_n)
     weight_n_K[0] = np.append(weight_K, 0.0)  # as any judge of results has it
     fitness_n, rmse_n = measure(T_n)
@@ -83,21 +87,24 @@ class TruePoses:
     whole: ModelSurface  # measures errors: completed by what was observed under the likeliest hypothesis
     T_k: np.ndarray  # (k, 4, 4)
     weight_k: np.ndarray  # probabilities
+    up_to_symmetry: bool = False
 
     @classmethod
-    def of(cls, observed: np.ndarray, surface: ModelSurface, T_K: np.ndarray, weight_K: np.ndarray) -> TruePoses:
+    def of(
+        cls, observed: np.ndarray, surface: ModelSurface, T_K: np.ndarray, weight_K: np.ndarray, up_to_symmetry: bool
+    ) -> TruePoses:
         """Return hypotheses (K, 4, 4) of the true pose of observed points (N, 3), and the other estimate."""
         whole = Stayed(T_K[int(np.argmax(weight_K))], observed, surface).whole_surface()
         T_k = np.concatenate([T_K, best_end(observed, surface)[None]])
-        return cls(whole, T_k, np.append((1 - OF_ESTIMATE) * weight_K, OF_ESTIMATE))
+        return cls(whole, T_k, np.append((1 - OF_ESTIMATE) * weight_K, OF_ESTIMATE), up_to_symmetry)
 
     def errors(self, T_n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return errors (n, k) of poses (n, 4, 4), and how probable each error is."""
         back_k = inverses(self.T_k)
-        distance_n_K = np.stack([self.whole.errors_up_to_symmetry(T @ back_k[:-1]) for T in T_n])
-        # The other estimate is so rough that along a symmetric shape it says little.
-        rough_n_1 = np.stack([self.whole.errors(T @ back_k[-1:]) for T in T_n])
-        return np.hstack([distance_n_K, rough_n_1]), np.tile(self.weight_k, (len(T_n), 1))
+        distance_n_k = np.stack([self.whole.errors(T @ back_k) for T in T_n])
+        if self.up_to_symmetry:  # but for the other estimate, which is so rough that along such a shape it says little
+            distance_n_k[:, :-1] = [self.whole.errors_up_to_symmetry(T @ back_k[:-1]) for T in T_n]
+        return distance_n_k, np.tile(self.weight_k, (len(T_n), 1))
 
 
 def best_end(observed: np.ndarray, surface: ModelSurface) -> np.ndarray:

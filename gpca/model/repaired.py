@@ -139,7 +139,7 @@ class Repair(ExplainedRegistration):
             hypotheses = np.array([hypothesis.T for hypothesis in searched]), weights_of(searched)
         else:
             hypotheses = repair.search(pair, diagnoser.reenactment, surface)
-        proposals = repair.propose(clouds.source, surface, T, *hypotheses, refine, measure)
+        proposals = repair.propose(clouds.source, surface, T, *hypotheses, refine, measure, up_to_symmetry=True)
         proposals.evidence.fitness_N[0], proposals.evidence.inlier_rmse_N[0] = pair.fitness_n[0], pair.inlier_rmse_n[0]
         described_F = None if method == GIVEN else described(pair, diagnoser.runs.icp)
         verdict = repair.decide(diagnoser.judge, level, proposals, tolerance, lost, described_F)
