@@ -43,6 +43,7 @@ from gpca.seeds import generator, seed_of
 from gpca.settings import Bounds, Count, read_settings
 
 REPAIR, LIKELIEST, STARTS, MANY_STARTS = "repair", "likeliest", "starts", "many_starts"
+DIGITS = 12  # of what rivals find
 TESTS = ("fitness", "inlier_rmse", "trimmed_cost", "spread", "weight")  # of a pose; the smaller, the surer
 NEVER = 1e6  # score of a pose that is not accepted
 TRIMMED = 0.8  # share of the distances that a trimmed cost counts, the smallest
@@ -266,7 +267,8 @@ class Rivals:
             method(pair.with_normals())
         started = perf_counter()
         outcome = method(pair.with_normals())
-        found_1 = outcome.T_target_source[None]
+        # Libraries add up in an order that the alignment of memory decides.
+        found_1 = outcome.T_target_source[None].round(DIGITS)
         refined_1 = self.registrar.register(self.before, found_1)[0]
         return self._tried(started, self._best(np.concatenate([found_1, refined_1])), failed=not outcome.converged)
 
@@ -288,7 +290,7 @@ class Rivals:
     def _tried(self, started: float, T: np.ndarray, doubt: float = 1.0, failed: bool = False) -> Tried:
         _, fitness_n, rmse_n = self.registrar.register(self.before, T[None], max_iterations=0)
         scores = (1 - fitness_n[0], rmse_n[0], self._trimmed_cost(T), self._spread(T), doubt)
-        score_Q = np.full(len(TESTS), NEVER) if failed or not fitness_n[0] else np.array(scores)
+        score_Q = np.full(len(TESTS), NEVER) if failed or not fitness_n[0] else np.array(scores).round(DIGITS)
         return T, score_Q, perf_counter() - started
 
     def _best(self, T_n: np.ndarray) -> np.ndarray:
