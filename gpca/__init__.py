@@ -1,6 +1,6 @@
 """GP-CA Bench: Gaussian-process concept attribution for point cloud registration, and its rivals."""
 
-__version__ = "0.3.0"  # the one place: pyproject.toml reads it here, and CITATION.cff is held to it by a test
+__version__ = "0.4.0"  # the one place: pyproject.toml reads it here, and CITATION.cff is held to it by a test
 
 _EXPORTS = {
     "CanonicalFrame": "gpca.objects.canonical",

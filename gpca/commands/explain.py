@@ -300,7 +300,7 @@ def _require_options(options: Namespace) -> None:
         refuse(("init", "pose", *OF_ONE), "is not for --pairs")
     if len(options.source) > 1:
         if not options.json_lines:
-            raise InputError(options.command, f"{len(options.source)} sources need one line each", "add --json-lines")
+            raise InputError("--json-lines", f"is needed for {len(options.source)} sources", "add it")
         refuse(OF_ONE, "is for one source", f"{options.command} one source after the other")
     refuse(OBJECT_OPTIONS if options.scans else (), "is not for scans")
     refuse(() if options.scans else ("voxel",), "is for scans alone", "add --scans")

@@ -101,9 +101,9 @@ class TruePoses:
     def errors(self, T_n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return errors (n, k) of poses (n, 4, 4), and how probable each error is."""
         back_k = inverses(self.T_k)
-        distance_n_k = np.stack([self.whole.errors(T @ back_k) for T in T_n])
-        if self.up_to_symmetry:  # but for the other estimate, which is so rough that along such a shape it says little
-            distance_n_k[:, :-1] = [self.whole.errors_up_to_symmetry(T @ back_k[:-1]) for T in T_n]
+        of = self.whole.errors_up_to_symmetry if self.up_to_symmetry else self.whole.errors
+        # The other estimate is so rough that along a symmetric shape it says little.
+        distance_n_k = np.array([[*of(T @ back_k[:-1]), *self.whole.errors(T @ back_k[-1:])] for T in T_n])
         return distance_n_k, np.tile(self.weight_k, (len(T_n), 1))
 
 

@@ -33,7 +33,7 @@ FAULTS = [
     (untouched, {"--estimator": "gauss"}, r"explain: estimator 'gauss': unknown; choose one of .*brossard"),
     (untouched, {"--estimator": "cello"}, r"explain: estimator 'cello': learns from registrations"),
     (untouched, {"--estimator": ""}, r"--estimator: '' is empty or does not fit on one line"),
-    (untouched, {"meshes/cone.ply": ["meshes/cone.ply"]}, r"explain: 2 sources need one line each; add --json-lines"),
+    (untouched, {"meshes/cone.ply": ["meshes/cone.ply"]}, r"explain: --json-lines: is needed for 2 sources; add it"),
     (untouched, {"--settings": {"draws": 3}}, r"--settings: is not used by explain"),
     (untouched, {"--html": "meshes/cone.ply"}, r"cone.ply: is also an input or another output"),
     (untouched, {"--png": "lost/../model.pt", "--model": "model.pt"}, r"model.pt: is also an input"),
