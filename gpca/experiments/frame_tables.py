@@ -29,7 +29,7 @@ SEEN, UNSEEN, DATASET = "seen", "unseen", "dataset/"  # beside `TOGETHER` in the
 SAMPLE = ["seed", "sample"]
 FRAME_FILES = {
     "prediction_files": "predictions/{frame_prediction}.csv",
-    "pose_files": "poses/{posed_frames}/seed{seed}.csv",
+    "pose_files": "poses/{frame_pose}.csv",
 }
 
 

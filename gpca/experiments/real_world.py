@@ -67,6 +67,7 @@ class RealWorldSettings:
     """Registrations of depth frames, every backbone with every reduction.
 
     Attributes:
+        seeds: how many the rows on frames have at least: those of the run, then the numbers after them.
         published: judged backbone -> encoder of its published architecture, whose rows stand beside the judged ones.
         published_seeds: how many of the run's seeds, from the first, these rows have; null: all.
         published_pretraining: changes of `pretraining` for these encoders.
@@ -93,6 +94,7 @@ class RealWorldSettings:
     one_encoder: bool
     causes: FrameCauseSettings
     reenactment: Reenactment
+    seeds: Count = 1
     published_seeds: Count | None = None
     published_pretraining: Pretraining = field(default_factory=dict)
 
@@ -146,6 +148,8 @@ def _check_training(config: dict) -> None:
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
     frames, seeds = config["real_world"], list(config["seeds"])
+    further = range(1, 1 + frames.get("seeds", 1) - len(seeds))
+    seeds_of = {REAL_WORLD: [*seeds, *(max(seeds) + number for number in further)]}
     backbones, published = frame_rows.reduced_backbones(frames), frame_rows.published_backbones(frames)
     published_seeds = seeds[: frames.get("published_seeds")]
     conditions = [f"{REAL_WORLD}_{name}" for name in conditions_of(config)]
@@ -154,23 +158,25 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
     others = list(frames["explainers"])
     methods_of = {REAL_WORLD: [*backbones, *published, *classic, *others]}
     methods_of |= {condition: [*condition_backbones, *others] for condition in conditions}
+    seeds_of |= dict.fromkeys(conditions, seeds)
     return {
         "frames": REAL_WORLD,
         "backbone": backbones,
         "first_backbone": backbones[0],
         "published": published,
+        "frame_seed": seeds_of[REAL_WORLD],
         "published_seed": published_seeds,
         "classic": classic,
         "frame_explainer": others,
         "condition": conditions,
-        "posed_frames": [REAL_WORLD, *conditions],
+        "frame_pose": [f"{source}/seed{seed}" for source, of_source in seeds_of.items() for seed in of_source],
         "condition_backbone": condition_backbones,
         "one_encoder": ONE_ENCODER if frames["one_encoder"] else "",
         "frame_prediction": [
             f"{source}/{method}/seed{seed}"
             for source, methods in methods_of.items()
             for method in methods
-            for seed in (published_seeds if method in published else seeds)
+            for seed in (published_seeds if method in published else seeds_of[source])
         ],
         "one_encoder_prediction": [
             f"{ONE_ENCODER}/{method}/seed{seed}" for method in backbones for seed in seeds if frames["one_encoder"]

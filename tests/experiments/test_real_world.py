@@ -26,7 +26,15 @@ def test_the_full_protocol_has_them_with_every_reduction_and_the_default_has_non
     assert names["estimated"] == "real_rgbd_estimated"
     assert list(config["real_world"]["published"].values()) == ["dgcnn_1024"]
     assert names["published_seed"] == config["seeds"][:1]
+    assert names["frame_seed"] == list(range(15))
+    last_seeds = {name.rpartition("/")[0]: name.rpartition("/")[2] for name in names["frame_prediction"]}
+    rows = ("real_rgbd/dgcnn-none", "real_rgbd/rule", "real_rgbd/dgcnn_1024-none", "real_rgbd_estimated/dgcnn-none")
+    assert [last_seeds[row] for row in rows] == ["seed14", "seed14", "seed0", "seed4"]
+    assert names["frame_pose"][14:17] == ["real_rgbd/seed14", "real_rgbd_estimated/seed0", "real_rgbd_estimated/seed1"]
     usual = names_of(without_false(load()), sources)
+    assert usual["frame_seed"] == usual["seed"] == [0, 1, 2]
+    few = without_false(changed("real_world.seeds", 4) | {"seeds": [7, 9]})
+    assert names_of(few, sources)["frame_seed"] == [7, 9, 10, 11]
     for name, epochs in {"dgcnn": 10, "dgcnn_1024": 5}.items():
         assert pretraining_of(config["real_world"], name)["epochs"] == epochs
     assert usual["published"] == [] and usual["condition_backbone"] == ["dgcnn-none"]

@@ -31,6 +31,7 @@ PLAN = Plan(Run(config), NAMES, SOURCES)
 TITLED = compared_sources(PLAN.run)
 LEARNING_SETTINGS = learning_settings(PLAN)
 FRAMES = NAMES["frames"]
+FRAME_SEEDS = NAMES["frame_seed"]
 EMBEDDING = NAMES["embedding"]
 REDUCTIONS = [name for name in config["reductions"] if name != "none"]
 PRETRAINED_ON = [*SOURCES, *([VIRTUAL] if config["real_world"]["virtual"] else [])]

@@ -34,7 +34,7 @@ COMPARED_PREDICTIONS = [
     f"<results>/{'/'.join(folder)}/seed{seed}.csv"
     for folder in folders_behind(COUNTERPARTS)
     if folder in PREDICTED
-    for seed in SEEDS
+    for seed in (FRAME_SEEDS if folder[1] == FRAMES else SEEDS)
 ]
 # Sources whose first failures the page shows with their measured causes.
 MEASURED = SOURCES if NAMES["cause_explainer"] else []

@@ -12,7 +12,7 @@ rule encoders:
         collect(
             f"<results>/encoders/{FRAMES}/{{encoder}}/seed{{seed}}.pt",
             encoder=config["real_world"]["backbones"],
-            seed=SEEDS,
+            seed=FRAME_SEEDS,
         ),
 
 
@@ -27,7 +27,7 @@ rule embeddings:
             f"<results>/embeddings/{FRAMES}/{{backbone}}/{{reduction}}/seed{{seed}}.npz",
             backbone=config["real_world"]["backbones"],
             reduction=config["real_world"]["reductions"],
-            seed=SEEDS,
+            seed=FRAME_SEEDS,
         ),
 
 
@@ -174,7 +174,7 @@ rule reduce_embeddings:
     benchmark:
         "<benchmarks>/embeddings/{source}/{backbone}/{reduction}.tsv"
     wildcard_constraints:
-        backbone=but_published(config["encoders"]),
+        source="|".join([*SOURCES, *NAMES["condition"]]),
     conda:
         "../envs/gpca.yaml"
     params:
@@ -185,7 +185,26 @@ rule reduce_embeddings:
         "../scripts/step.py"
 
 
-# Encoders as published have fewer seeds.
+# Depth frames have seeds of their own, and on them encoders as published fewer.
+use rule reduce_embeddings as reduce_on_frames with:
+    input:
+        embeddings=collect(
+            "<results>/embeddings/{{source}}/{{backbone}}/none/seed{seed}.npz",
+            seed=FRAME_SEEDS,
+        ),
+        code=code_stamp("gpca.steps.pairs:reduce"),
+    output:
+        out=collect(
+            "<results>/embeddings/{{source}}/{{backbone}}/{{reduction}}/seed{seed}.npz",
+            seed=FRAME_SEEDS,
+        ),
+    wildcard_constraints:
+        source=FRAMES,
+        backbone=but_published(config["encoders"]),
+    params:
+        seeds=FRAME_SEEDS,
+
+
 use rule reduce_embeddings as reduce_published with:
     input:
         embeddings=collect(
@@ -199,6 +218,7 @@ use rule reduce_embeddings as reduce_published with:
             seed=NAMES["published_seed"],
         ),
     wildcard_constraints:
+        source=FRAMES,
         backbone="|".join(REAL_WORLD["published"].values()) or "none",
     params:
         seeds=NAMES["published_seed"],

@@ -36,7 +36,7 @@ rule attribute:
     benchmark:
         "<benchmarks>/predictions/{source}/{explainer}.tsv"
     wildcard_constraints:
-        explainer=but_published(EXPLAINED),
+        source="|".join([*SOURCES, *NAMES["condition"]]),
     priority: 11  # as `embed`
     conda:
         "../envs/gpca.yaml"
@@ -49,7 +49,33 @@ rule attribute:
         "../scripts/step.py"
 
 
-# Encoders as published have fewer seeds.
+# Depth frames have seeds of their own, and on them encoders as published fewer.
+use rule attribute as attribute_on_frames with:
+    input:
+        unpack(lambda wildcards: read_by_explainer(wildcards, FRAME_SEEDS)),
+        registrations=collect(
+            "<results>/registrations/{{source}}/seed{seed}.npz", seed=FRAME_SEEDS
+        ),
+        code=lambda wildcards: code_stamp(
+            "gpca.steps.pairs:attribute",
+            explainer_module(explainer_of(wildcards.explainer, NAMES)),
+        ),
+    output:
+        predictions=collect(
+            "<results>/predictions/{{source}}/{{explainer}}/seed{seed}.csv",
+            seed=FRAME_SEEDS,
+        ),
+        timings=collect(
+            "<results>/timings/{{source}}/{{explainer}}/seed{seed}.csv",
+            seed=FRAME_SEEDS,
+        ),
+    wildcard_constraints:
+        source=FRAMES,
+        explainer=but_published(EXPLAINED),
+    params:
+        seeds=FRAME_SEEDS,
+
+
 use rule attribute as attribute_published with:
     input:
         unpack(lambda wildcards: read_by_explainer(wildcards, NAMES["published_seed"])),
@@ -68,6 +94,7 @@ use rule attribute as attribute_published with:
             seed=NAMES["published_seed"],
         ),
     wildcard_constraints:
+        source=FRAMES,
         explainer="|".join(NAMES["published"]) or "none",
     params:
         seeds=NAMES["published_seed"],
@@ -91,6 +118,7 @@ use rule attribute as attribute_one_encoder with:
         code=code_stamp("gpca.steps.pairs:attribute", explainer_module("gpca")),
     wildcard_constraints:
         source=ONE_ENCODER,
+        explainer=but_published(EXPLAINED),
     params:
         files_of=FRAMES,
         files_seed=SEEDS[0],

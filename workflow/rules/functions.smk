@@ -25,8 +25,3 @@ def explainer_settings(wildcards):
     """Return the settings of an explainer in the config, or of one that is asked about frames alone."""
     name = explainer_of(wildcards.explainer, NAMES)
     return config["explainers"].get(name) or REAL_WORLD["explainers"].get(name) or {}
-
-
-def seeds_of_frame_row(method):
-    """Return the seeds of a row on depth frames."""
-    return NAMES["published_seed"] if method in NAMES["published"] else SEEDS

@@ -3,9 +3,10 @@ rule registrations:
     input:
         collect(
             "<results>/registrations/{source}/seed{seed}.npz",
-            source=[*SOURCES, FRAMES],
+            source=SOURCES,
             seed=SEEDS,
         ),
+        collect(f"<results>/registrations/{FRAMES}/seed{{seed}}.npz", seed=FRAME_SEEDS),
 
 
 rule register:
