@@ -19,7 +19,7 @@ def test_every_mean_has_a_cell_with_its_difference_and_those_that_no_run_decides
     once = judged_once(comparison)
     cells = [claims._words(row) for row in once.to_dict("records")]
     assert sorted(word for word in words if word in set(cells)) == sorted(cells)
-    assert len(cells) == 93
+    assert len(cells) == 89
     by_paper = (once["reason"] == PAPER_TOO_WIDE).sum()
     assert f"{by_paper} {claims.BY_PAPER}" in words
     assert f"{(once['verdict'] == 'inconclusive').sum() - by_paper} inconclusive" in words
