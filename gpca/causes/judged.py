@@ -173,7 +173,7 @@ MEASURES: Mapping[str, Measure] = {
     # Share of the nominal above the alarm that finds 90 % of the failed.
     "false_alarm_rate": Measure(counted=lambda samples: samples.label == NOMINAL, least_is_best=True),
     # Expected calibration error of the score of "nominal", in ten bins.
-    "nominal_calibration": Measure(counted=_labeled, limits=ANYTHING, least_is_best=True),
+    "nominal_calibration": Measure(counted=_labeled, limits=(0.0, 1.0), least_is_best=True),
     "state_accuracy": Measure(counted=_labeled),  # mean of the shares of the nominal and the failed that are called so
     "state_accuracy_shown": Measure(counted=_shown),  # by the state of that registration alone,
     "auroc_failed_shown": Measure(counted=_shown),  # whatever it does from other starts
@@ -188,7 +188,7 @@ SMALLER_IS_BETTER = tuple(name for name, each in MEASURES.items() if each.least_
 
 
 def measure(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
-    """Return every measure (B,) of :data:`MEASURES` that the explainer has."""
+    """Return every measure (B,) of :data:`MEASURES` that the explainer has, of the samples themselves and of draws."""
     labeled_N, shown_N, failed_N = _labeled(samples), _shown(samples), _failed(samples)
     weights_B_n, weights_B_F = weights_B_N[:, labeled_N], weights_B_N[:, failed_N]
     called_failed_N = samples.nominal < samples.scores.max(axis=1)
@@ -201,6 +201,9 @@ def measure(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
         calibration_B += np.abs((weights_B_n[:, inside_n] * (score_n - is_nominal_n)[inside_n]).sum(axis=1))
     with np.errstate(divide="ignore", invalid="ignore"):
         calibration_B /= weights_B_n.sum(axis=1)
+    drawn_B = calibration_B[1:]
+    if (finite_B := np.isfinite(drawn_B)).any():  # repeated samples inflate it
+        drawn_B += calibration_B[0] - drawn_B[finite_B].mean()
     measures = {
         "state_accuracy": _state_accuracy(samples.label, called_failed_N, weights_B_N),
         "state_accuracy_shown": _state_accuracy(samples.shown, called_failed_N, weights_B_N),

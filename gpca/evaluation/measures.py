@@ -157,9 +157,12 @@ def intervals(records: list[tuple], name: str, most: float = np.inf) -> Frame:
         keys = [*(key for key in KEYS if key != "method"), AGAINST[0]]
         measured = rows[rows[AGAINST[0]] == ""].groupby(keys[:-1], sort=False)
         reach = (measured["high"].max() - measured["low"].min()).dropna().to_dict()
+        methods = measured["method"].agg(set).to_dict()
         for (*place, kind), of in rows[rows[AGAINST[0]] != ""].groupby(keys, sort=False):
             value_M, low_M, high_M, clusters_M = (of[name].to_numpy() for name in ("value", "low", "high", "clusters"))
-            bounds = corrected(value_M, low_M, high_M, clusters_M, kind in PICKED, reach.get(tuple(place), most))
+            beside = set(of["other"]) <= methods.get(tuple(place), set())  # else it was measured in another place
+            farthest = reach.get(tuple(place), most) if beside else most
+            bounds = corrected(value_M, low_M, high_M, clusters_M, kind in PICKED, farthest)
             rows.loc[of.index, ["low", "high"]] = np.column_stack(bounds)
     return rows
 

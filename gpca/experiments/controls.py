@@ -243,7 +243,7 @@ def collect_intervals(run: Run, files: Paths) -> Frame:
             for (control, trained_on), group in measured.items():
                 if explainer in group:
                     records += _records((control, source), trained_on, explainer, group)
-    return intervals(records, "controls")
+    return intervals(records, "controls", most=1.0)
 
 
 def _values(rows: Frame, draws: Clustered) -> Values:

@@ -111,6 +111,9 @@ def test_false_alarms_and_the_calibration_of_nominal_are_those_of_their_definiti
     nominal = judged.label == NOMINAL
     assert one(replace(judged, nominal=nominal.astype(float)))["nominal_calibration"] == 0
     assert one(replace(judged, nominal=1.0 - nominal))["nominal_calibration"] == 1
+    draws_B_N = np.vstack([np.ones(len(judged)), np.random.default_rng(1).integers(0, 3, size=(50, len(judged)))])
+    value, *drawn_B = measure(judged, draws_B_N)["nominal_calibration"]
+    assert np.mean(drawn_B) == pytest.approx(value)  # which repeated samples would inflate
 
 
 def test_a_gate_has_the_measures_of_an_alarm_alone_and_samples_between_the_limits_none(judged):

@@ -109,3 +109,18 @@ def test_files_of_both_forms_are_read_back(samples, tmp_path):
     write_metrics(intervals(records, "tiny"), tmp_path / "against.csv")
     rows = m.read_clustered(tmp_path / "against.csv")
     assert rows[list(m.AGAINST)].to_numpy().tolist() == [["", ""], ["rival", "b"], ["", ""], ["rival", "a"]]
+
+
+def test_a_difference_from_what_was_measured_in_another_place_may_be_farther_than_values_here():
+    def row(method, value, low, high, kind="", other=""):
+        return ("hard", "ycb", method, "accuracy", ALL, kind, other, 2, 9, 200, value, low, high)
+
+    measured = [row("gpca", 0.45, 0.4, 0.5), row("rule", 0.32, 0.3, 0.4)]
+    differences = [
+        row("gpca", -0.55, -0.6, -0.5, "usual", "paper"),
+        row("gpca", 0.13, -0.3, 0.4, "rival", "rule"),
+    ]
+    rows = intervals(measured + differences, "controls", most=1.0)
+    low, high = (value(rows, name, against="usual") for name in ("low", "high"))
+    assert -1 < low < -0.6 < -0.55 < -0.5 < high < 0
+    assert value(rows, "low", against="rival") == pytest.approx(-0.2)  # from the least here to the most
