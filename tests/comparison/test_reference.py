@@ -3,6 +3,7 @@
 import json
 import shutil
 
+import pandas as pd
 import pytest
 import yaml
 
@@ -285,6 +286,11 @@ def test_the_kept_reference_can_be_read():
     assert {folder.name for folder in folders} >= {"default", "full"} and len(files) >= 8
     for path in (path for path, name in files if name not in reference.NOT_COMPARED):
         assert len(read_means(path)) > 5
+        rows = pd.read_csv(path, low_memory=False)
+        for value, low, high in (("mean", "ci_low", "ci_high"), ("value", "low", "high")):
+            if {value, low, high} <= set(rows):
+                of = rows[[low, value, high]].apply(pd.to_numeric, errors="coerce").dropna()
+                assert ((of[low] <= of[value] + 1e-9) & (of[value] <= of[high] + 1e-9)).all(), path
     with pytest.raises(InputError, match="neither tidy"):
         read_means(ROOT / "gpca/comparison/reasons.csv")
 
