@@ -209,7 +209,7 @@ def measured(verdicts: Frame) -> Frame:
                 if (mask_N := part_N & called_N & each["replaced"].to_numpy()).any():
                     drawn = draws.subset(mask_N)
                     values = {name: weighted_mean(~each["right"][mask_N], drawn.weights)}
-                    records += compared(keys, "wrong", part, values, drawn)
+                    records += compared(keys, "wrong", part, values, drawn, SHARE)
     return intervals(records, "repairs")
 
 

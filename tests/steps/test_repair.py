@@ -102,6 +102,12 @@ def test_few_of_the_replaced_are_wrong_and_a_rival_needs_a_test():
     assert set(lead["method"]) == {REPAIR} and set(lead["other"]) == {"tells"} and (lead["value"] > 0).all()
 
 
+def test_none_wrong_of_a_few_replaced_may_still_be_some():
+    rows = verdicts({CAUSES: [("tiny", 0, drawn(0, families=12, each=4))]}, TOLERANCE).assign(right=True)
+    numbers = measured(rows).query("metric == 'wrong' and concept == 'all'")
+    assert (numbers["value"] == 0).all() and (numbers["high"] > 0.05).all()
+
+
 def test_the_tested_family_has_no_say_in_its_limits():
     one = drawn(0)
     mine = one.family_N == "family 3"
