@@ -82,6 +82,8 @@ rule model:
         "<benchmarks>/model.tsv"
     conda:
         "../envs/gpca.yaml"
+    resources:
+        mem_mb=6000,  # 4500 in the full protocol
     params:
         step="gpca.steps.causes:model",
         title=TITLED["model"]["title"],
