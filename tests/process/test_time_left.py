@@ -83,13 +83,14 @@ def test_a_benchmark_file_that_says_nothing_is_none(tmp_path, text):
 
 
 def test_the_times_that_come_with_the_workflow_are_those_of_its_rules():
-    rules = "".join(path.read_text() for path in (ROOT / "workflow/rules").rglob("*.smk"))
+    files = [*(ROOT / "workflow/rules").rglob("*.smk"), *(ROOT / "gpca/experiments").glob("*.py")]
+    rules = "".join(path.read_text() for path in files)
     times = read_times(TIMES)
     assert set(times) == {"default", "full"}
     for of_run in times.values():
         assert all(seconds >= 0 for seconds in of_run.values())
         longest = max(of_run, key=of_run.get)
-        assert f"rule {longest}:" in rules or f" as {longest} with:" in rules
+        assert f"rule {longest}:" in rules or f'name="{longest}"' in rules
 
 
 @pytest.mark.parametrize(
