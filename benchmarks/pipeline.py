@@ -1,7 +1,7 @@
 """Where the time of a run goes, stage by stage, and how much of it is the workflow's own.
 
     python benchmarks/pipeline.py [--configfile config/smoke.yaml] [--cores 2] [--config data_dir=/data]
-    python benchmarks/pipeline.py --existing full [--write docs/appendix.md]
+    python benchmarks/pipeline.py --existing full
 
 The first form makes everything afresh as the run `benchmark` (results/benchmark is removed first) and takes the wall
 time with a clock; without --configfile it is the default run. The second only reads the files of a run that is
@@ -11,8 +11,7 @@ benchmark files (seconds of the whole job). From cores × wall time, the core ti
     share of a stage = its work / core time,    overhead share = 1 - all work / core time ,
 
 the latter being process starts, imports, Snakemake itself and idle cores. Jobs use one thread each. What a step
-imports only when it needs it counts as work. --write puts the stages, longest first, between the two comments that the
-page has for the run. The last line is a JSON object: stages, overhead_share, peak_mb.
+imports only when it needs it counts as work. The last line is a JSON object: stages, overhead_share, peak_mb.
 """
 
 import argparse
@@ -27,7 +26,6 @@ from time import perf_counter
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
-from benchmarks import markdown  # noqa: E402 (the script runs from a plain checkout)
 from gpca.errors import InputError  # noqa: E402
 
 RUN = "benchmark"
@@ -59,7 +57,6 @@ STAGES = (
     "figures",
 )
 SIDECAR = ".provenance.json"
-SMALL = 0.04  # of the time of all jobs: stages below it share a row of the page
 
 
 @dataclass
@@ -83,7 +80,6 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--config", nargs="+", default=[], metavar="KEY=VALUE", help="as for snakemake")
     parser.add_argument("--cores", type=int, default=2, help="default 2")
     parser.add_argument("--existing", metavar="RUN", help="run nothing, only read results/RUN")
-    parser.add_argument("--write", type=Path, metavar="PAGE", help="Markdown page with a place for the stages")
     options = parser.parse_args(arguments)
     folder = ROOT / "results" / (options.existing or RUN)
     try:
@@ -92,8 +88,6 @@ def main(arguments: list[str] | None = None) -> int:
         if wall_s is None:
             wall_s = wall_time(folder)
             print("Wall time is taken from the times of the files: pauses count, Snakemake's own start does not.")
-        if options.write:
-            markdown.write_between(options.write, f"the stages of results/{folder.name}", page_table(stages))
     except InputError as fault:
         print(f"pipeline: {fault}", file=sys.stderr)
         return 2
@@ -168,24 +162,6 @@ def summary(stages: dict[str, Stage], core_s: float) -> dict:
     work_s = sum(sum(stage.work_s) for stage in stages.values())
     peak_mb = max(stage["peak_mb"] for stage in numbers.values())
     return {"stages": numbers, "overhead_share": round(1 - work_s / core_s, 4), "peak_mb": peak_mb}
-
-
-def page_table(stages: dict[str, Stage]) -> list[str]:
-    """Return the stages as a Markdown table, longest first, with what their processes take to start and import.
-
-    Of a stage without benchmark files the work counts alone; what is no stage of its own belongs to the jobs of others.
-    """
-    stages = {name: stage for name, stage in stages.items() if stage.job_s or name in STAGES}
-    time_s = {name: sum(stage.job_s or stage.work_s) for name, stage in stages.items()}
-    of_all_s = sum(time_s.values())
-    long = [name for name in sorted(time_s, key=lambda name: -time_s[name]) if time_s[name] >= SMALL * of_all_s]
-    rows = []
-    for title, names in [*((f"`{name}/`", [name]) for name in long), ("all others", sorted(set(stages) - set(long)))]:
-        row_s, work_s = sum(time_s[name] for name in names), sum(sum(stages[name].work_s) for name in names)
-        jobs = sum(len(stages[name].job_s or stages[name].work_s) for name in names)
-        starting = f"{max(row_s - work_s, 0) / 60:.1f}"
-        rows.append([title, jobs, f"{row_s / 60:.1f}", f"{row_s / of_all_s:.0%}", starting])
-    return markdown.table(["stage", "jobs", "time of its jobs (min)", "share", "of which start-up (min)"], rows)
 
 
 def print_table(stages: dict[str, Stage], result: dict, cores: int, wall_s: float) -> None:
