@@ -13,7 +13,7 @@ from gpca.attribution.predictions import read_predictions
 from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.causes.truth import ALL, BORDERLINE, FAILED, NOMINAL, Truth
 from gpca.errors import InputError
-from gpca.evaluation.intervals import ANYTHING, mean_ranks, weighted_mean
+from gpca.evaluation.intervals import ANYTHING, centered, mean_ranks, weighted_mean
 from gpca.evaluation.measures import SHARE, Measure, source_method_seed
 from gpca.io.container import require_same_samples
 from gpca.io.frame import Frame
@@ -201,9 +201,6 @@ def measure(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
         calibration_B += np.abs((weights_B_n[:, inside_n] * (score_n - is_nominal_n)[inside_n]).sum(axis=1))
     with np.errstate(divide="ignore", invalid="ignore"):
         calibration_B /= weights_B_n.sum(axis=1)
-    drawn_B = calibration_B[1:]
-    if (finite_B := np.isfinite(drawn_B)).any():  # repeated samples inflate it
-        drawn_B += calibration_B[0] - drawn_B[finite_B].mean()
     measures = {
         "state_accuracy": _state_accuracy(samples.label, called_failed_N, weights_B_N),
         "state_accuracy_shown": _state_accuracy(samples.shown, called_failed_N, weights_B_N),
@@ -211,7 +208,7 @@ def measure(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
         "auroc_failed": ranked["area"],
         "auprc_failed": ranked["precision"],
         "false_alarm_rate": ranked["false_alarms"],
-        "nominal_calibration": calibration_B,
+        "nominal_calibration": centered(calibration_B),
     }
     if not samples.names_causes:
         return measures

@@ -164,6 +164,15 @@ def mean_interval(values_R: Iterable[float], level: float = LEVEL) -> Estimate:
     return Estimate(mean, mean - half_width, mean + half_width)
 
 
+def centered(value_B: np.ndarray) -> np.ndarray:
+    """Values (1 + B,) whose draws are shifted until their mean is the value.
+
+    Repeated samples inflate what is no mean over samples, for example a calibration error.
+    """
+    drawn_B, finite_B = value_B[1:], np.isfinite(value_B[1:])
+    return np.append(value_B[:1], drawn_B - drawn_B[finite_B].mean() + value_B[0]) if finite_B.any() else value_B
+
+
 def weighted_mean(value_N: np.ndarray, weights_B_N: np.ndarray) -> np.ndarray:
     """Mean of a value by weights of its samples (B,); NaN where no sample has weight."""
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -230,8 +239,8 @@ class Clustered:
     ) -> Estimate:
         """Mean over the seeds, weighted by their samples, of a measure that is no mean over samples.
 
-        It has values (1 + B,) of the samples in given rows (n,) with weights (1 + B, n). Repeated samples can inflate
-        it, for example a calibration error, so its draws are shifted until their mean equals the value.
+        It has values (1 + B,) of the samples in given rows (n,) with weights (1 + B, n). Its draws are
+        :func:`centered`.
         """
         total_B, drawn_B = np.zeros(len(self.weights)), np.zeros(len(self.weights))
         for seed in np.unique(self.seed):
@@ -242,8 +251,7 @@ class Clustered:
             drawn_B += count_B
         with np.errstate(divide="ignore", invalid="ignore"):  # a draw without samples has no value
             value_B = total_B / drawn_B
-        finite_B = value_B[1:][np.isfinite(value_B[1:])]
-        return self.estimate(np.append(value_B[:1], finite_B - finite_B.mean() + value_B[0]), limits)
+        return self.estimate(centered(value_B), limits)
 
     def record(self, keys: tuple, estimate: Estimate) -> tuple:
         """Row of keys, numbers of seeds, clusters and samples, value and bounds."""

@@ -163,19 +163,22 @@ def standard_streams() -> Iterator[None]:
     for stream in (sys.stdin, sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
-    unwritable = "redirect it to a file"
     try:
         yield
     except BrokenPipeError as fault:
-        raise InputError("stdout", f"cannot be written ({fault.strerror})", unwritable) from fault
+        raise _unwritable(fault) from fault
     finally:
         try:
             sys.stdout.flush()
         except OSError as fault:
             _discard(sys.stdout)
-            raise InputError("stdout", f"cannot be written ({fault.strerror})", unwritable) from fault
+            raise _unwritable(fault) from fault
         except ValueError as fault:  # code from outside has closed it
             raise InputError("stdout", "has been closed", "leave it open") from fault
+
+
+def _unwritable(fault: OSError) -> InputError:
+    return InputError("stdout", f"cannot be written ({fault.strerror})", "redirect it to a file")
 
 
 def say(line: str) -> None:

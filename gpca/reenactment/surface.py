@@ -85,10 +85,10 @@ class ModelSurface:
         """Return the errors (n,) of poses (n, 4, 4) where the identity is right: ADD, or for symmetric models the mean
         distance from the surface, which does not grow with the points' spacing as ADD-S does."""
         points = self.points[:JUDGED]
+        if not self.symmetric:
+            return _add(T_n, points)
         moved = _moved(T_n, points)
-        if self.symmetric:
-            return self.distances(moved.reshape(-1, 3)).reshape(moved.shape[:2]).mean(axis=1)
-        return np.sqrt(np.square(moved - points).sum(axis=2)).mean(axis=1)
+        return self.distances(moved.reshape(-1, 3)).reshape(moved.shape[:2]).mean(axis=1)
 
     def errors_up_to_symmetry(self, T_n: np.ndarray) -> np.ndarray:
         """Return the errors (n,) of poses (n, 4, 4) where the identity is right: ADD from the nearest of the poses at
@@ -97,8 +97,7 @@ class ModelSurface:
             return self.errors(T_n)
         turns_n = np.array([symmetric_turn(T[:3, :3], self._equivalent) for T in T_n])
         about_center_n = rigid_motion(turns_n, self.center - turns_n @ self.center)
-        points = self.points[:JUDGED]
-        return np.sqrt(np.square(_moved(T_n @ about_center_n, points) - points).sum(axis=2)).mean(axis=1)
+        return _add(T_n @ about_center_n, self.points[:JUDGED])
 
     @cached_property
     def _equivalent(self) -> dict[str, list]:
@@ -147,6 +146,11 @@ def _planes(around_M_k_3: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     centers = around_M_k_3.mean(axis=1)
     moments = second_moments(around_M_k_3 - centers[:, None])
     return centers, np.linalg.eigh(moments)[1]
+
+
+def _add(T_n: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return the mean distance (n,) of points (N, 3) from themselves after each motion (n, 4, 4)."""
+    return np.sqrt(np.square(_moved(T_n, points) - points).sum(axis=2)).mean(axis=1)
 
 
 def _moved(T_n: np.ndarray, points: np.ndarray) -> np.ndarray:
